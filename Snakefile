@@ -11,9 +11,19 @@
 #
 # What goes beyond the paper is in studies/, with a Snakefile of its own.
 
+import os
+import sys
+
 from snakemake.utils import min_version
 
 min_version("9.0")
+
+# It is no path where Snakemake fetches a module file by file.
+if not isinstance(workflow.current_basedir, os.PathLike):
+    sys.exit(
+        "nbv: error: the folder config is read from disk: clone the repository, and write the path "
+        "of the clone's Snakefile after `snakefile:`"
+    )
 
 
 report: "workflow/report/run.rst"
@@ -35,8 +45,9 @@ localrules:
     bundles,
 
 
+# The first rule is the default target; `default_target: True` would take that from a Snakefile which
+# uses this one as a module.
 rule all:
-    default_target: True
     input:
         "<results>/report.html",
 

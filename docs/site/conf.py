@@ -31,7 +31,8 @@ extensions = [
 ]
 
 root_doc = "README"
-DOCUMENTS = {"README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "studies"}
+DOCUMENTS = {"README.md", "CONTRIBUTING.md", "CODE_OF_CONDUCT.md", "SECURITY.md", "CHANGELOG.md"}
+DOCUMENTS |= {"config", "docs", "studies"}
 exclude_patterns = [path.name for path in ROOT.iterdir() if path.name not in DOCUMENTS]
 
 myst_enable_extensions = ["dollarmath"]

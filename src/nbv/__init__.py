@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from nbv.tables.orientation_table import OrientationTable as OrientationTable
     from nbv.tables.walks import forecast as forecast
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 # Names and not imports: `import nbv` stays quick, and no job depends on all of these modules.
 _MODULES = {

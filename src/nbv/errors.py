@@ -95,14 +95,9 @@ class UserError(Exception):
 
 
 class NamedError(UserError):
-    """An error with a name, for programs.
+    """An error with a stable name, such as ``empty-mask``, for programs.
 
-    Attributes
-    ----------
-    name : str
-        A stable name, such as ``empty-mask``, with which the text of the error starts.
-    message : str
-        The text after the name.
+    The text of the error is the name and then the message.
     """
 
     def __init__(self, name: str, message: str) -> None:

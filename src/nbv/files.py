@@ -92,13 +92,7 @@ def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
 
 @contextmanager
 def readable(path: str | Path, remedy: str = RUN_AGAIN) -> Iterator[None]:
-    """Convert any error of a reader into a UserError that names the file, and a remedy.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, or the block cannot read it.
-    """
+    """Convert any error of a reader into a UserError that names the file, and a remedy."""
     try:
         yield
     except UserError:
@@ -142,18 +136,8 @@ def calibrated_file(path: str | Path) -> Path:
 def stored_table(path: str | Path, names: Iterable[str], kind: str) -> Iterator[Arrays]:
     """Yield the arrays of a table of nbv calibrate or of a run, for checks with its remedy.
 
-    Parameters
-    ----------
-    path : path
-    names : iterable of str
-        Arrays that every table of this kind has.
-    kind : str
-        What such a table holds, for messages.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read, is of another kind, or the block raises any error.
+    Every table of this kind has arrays of these names; `kind` is what it holds, for messages. Raise
+    UserError if the file cannot be read, is of another kind, or the block raises any error.
     """
     arrays = read_arrays(calibrated_file(path), (), CALIBRATE_AGAIN)
     if not set(names) <= set(arrays):
@@ -241,19 +225,9 @@ def read_text(path: Path) -> str:
 def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
     """Read a user's CSV file as text, so that an object may be called NA.
 
-    Spaces around a cell do not count, nor do capitals in the head and comments (#) before it.
-
-    Parameters
-    ----------
-    path : path
-    needed : sequence of str
-        Required columns.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read, a column is missing or occurs twice, there are no rows, or a
-        row has more or fewer values than the head.
+    Spaces around a cell do not count, nor do capitals in the head and comments (#) before it. Raise
+    UserError if the file cannot be read, a needed column is missing, one occurs twice, there are no
+    rows, or a row has more or fewer values than the head.
     """
     import pandas as pd  # here, so that loading a lookup table costs no import of pandas
 
@@ -314,10 +288,7 @@ def need_columns(path: Path, table: pd.DataFrame, needed: Sequence[str]) -> None
 def read_numbers(path: Path) -> NDArray[Any]:
     """Read the numbers of a user's ``.npy`` file.
 
-    Raises
-    ------
-    UserError
-        If the file does not exist or cannot be read.
+    Raise UserError if the file does not exist or cannot be read.
     """
     if not path.is_file():
         raise UserError(f"{path} {missing(path)}")
@@ -333,10 +304,7 @@ def read_arrays(
 ) -> dict[str, NDArray[Any]]:
     """Read an `.npz` of `write_arrays`, with the errors of `readable`.
 
-    Raises
-    ------
-    UserError
-        If one of the arrays `names` is missing.
+    Raise UserError if one of the arrays `names` is missing.
     """
     with readable(path, remedy), np.load(path, allow_pickle=False) as stored:
         arrays = {name: stored[name] for name in stored.files}

@@ -40,10 +40,7 @@ FARTHEST_M = 50.0
 def as_finite(values: ArrayLike, name: str, n: int, hint: str = "") -> Array:
     """Return n finite numbers (n,), from an array of any shape or from texts.
 
-    Raises
-    ------
-    UserError
-        If there are not n numbers, or one is not finite; `hint` ends the message.
+    Raise UserError if there are not n numbers, or one is not finite; `hint` ends the message.
     """
     try:
         given = np.asarray(values)
@@ -67,10 +64,7 @@ def as_point(values: ArrayLike, name: str) -> Array:
 def as_position(values: ArrayLike, name: str) -> Array:
     """Return the position (3,) of an object in the camera's frame, millimetres.
 
-    Raises
-    ------
-    UserError
-        If the camera cannot see an object there.
+    Raise UserError if the camera cannot see an object there.
     """
     position = as_finite(values, name, 3)
     if position[2] <= 0:
@@ -89,12 +83,8 @@ def as_orientations(values: ArrayLike, name: str) -> Array:
     """Return rotation matrices (..., 3, 3).
 
     A matrix that is a rotation within `ORIENTATION_TOLERANCE` stays as it is. Others are replaced
-    by the nearest rotation if it is within `ROUNDED_DEG`: ‖R - R₀‖ / √2, Frobenius norm.
-
-    Raises
-    ------
-    UserError
-        Names the first matrix that is not a rotation, and why.
+    by the nearest rotation if it is within `ROUNDED_DEG`: ‖R - R₀‖ / √2, Frobenius norm. A
+    UserError names the first matrix that is not a rotation, and why.
     """
     try:
         array = np.asarray(values, dtype=np.float64)
@@ -137,24 +127,9 @@ def column(
 ) -> Array:
     """Return the numbers in the cells of a column of a file: (rows,), or (rows, n) where n > 1.
 
-    Parameters
-    ----------
-    path : path
-        The file, for messages.
-    rows : DataFrame
-        Texts; the index counts the rows of the file from 0.
-    name : str
-    n : int
-        How many numbers, separated by spaces, a cell has.
-    limit : float
-        Largest magnitude of a number.
-    is_optional : bool
-        Whether cells may be empty, which gives NaN.
-
-    Raises
-    ------
-    UserError
-        Names the row of a cell with something else.
+    The rows are texts, and their index counts the rows of the file from 0. A cell has n numbers,
+    separated by spaces, of a magnitude up to `limit`; if it `is_optional`, it may be empty, which
+    gives NaN. A UserError names the row of a cell with something else.
     """
     numbers = np.full((len(rows), n), np.nan)
     for i, (row, text) in enumerate(zip(rows.index, rows[name], strict=True)):

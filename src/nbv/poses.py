@@ -101,21 +101,10 @@ AnyPose = ArrayLike | Mapping[str, Any] | GivenPose
 def as_given(given: AnyPose, name: str, quaternion: str | None = None) -> GivenPose:
     """Return one pose of any form.
 
-    Parameters
-    ----------
-    given : array-like or mapping
-        A 3 × 3 or 4 × 4 matrix, or its numbers row by row, or a position and a quaternion. Or a
-        mapping of R, quaternion_xyzw or quaternion_wxyz and perhaps t (mm) or position (m), BOP's
-        entry, ROS's Pose or PoseStamped, or one of all these as pose.
-    name : str
-        For messages.
-    quaternion : "xyzw" or "wxyz", optional
-        The order in which 7 numbers have the quaternion.
-
-    Raises
-    ------
-    UserError
-        If it is no rotation with a translation.
+    It is a 3 × 3 or 4 × 4 matrix, or its numbers row by row, or a position and a quaternion, in the
+    order xyzw or wxyz that `quaternion` names. Or it is a mapping of R, quaternion_xyzw or
+    quaternion_wxyz and perhaps t (mm) or position (m), BOP's entry, ROS's Pose or PoseStamped, or
+    one of all these as pose. Raise UserError if it is no rotation with a translation.
     """
     if isinstance(given, GivenPose):
         return given
@@ -233,12 +222,8 @@ def read_entries(
     """Return the poses of a source, in forms of `as_given`, and what messages call them.
 
     Arrays are (..., 4, 4), (..., 3, 3), or rows of 7, 9 or 16 numbers; `flat` says which of these
-    sizes a pose may have where several are in one row.
-
-    Raises
-    ------
-    UserError
-        If it cannot be read, has another shape, or one that fits several numbers of poses.
+    sizes a pose may have where several are in one row. Raise UserError if it cannot be read, has
+    another shape, or one that fits several numbers of poses.
     """
     given = read_given(source)
     name = str(source) if isinstance(source, str | Path) else f"`{option}`"

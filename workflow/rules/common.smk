@@ -28,12 +28,9 @@ from nbv.experiment.stages import FEATURES, PRETRAINED, stage_from
 # Figures need no backend, and one that is unknown here, such as Jupyter's, ends the import of
 # matplotlib, in this process and in its jobs.
 os.environ.pop("MPLBACKEND", None)
-# The Snakefile that was started lies in the project's folder, or below it.
-ROOT = next(
-    folder
-    for folder in Path(workflow.basedir, "Snakefile").parents
-    if Path(folder, "config", "config.yaml").is_file()
-)
+# Neither the Snakefile that was started nor the working directory need be the project's: a Snakefile
+# elsewhere can use this one as a module.
+ROOT = Path(workflow.current_basedir).parents[1]
 
 
 @contextmanager

@@ -20,13 +20,15 @@ SECTIONS = {
         "docs/bundles",
     ),
     "Understand it": ("docs/method", "docs/paper"),
-    "Run it": ("docs/guide", "studies/README", "docs/data", "docs/scale"),
+    "Run it": ("docs/guide", "config/README", "studies/README", "docs/data", "docs/scale"),
     "Results": (f"{RESULTS}/README",),
     "Change it": (
         "docs/extending",
         "docs/architecture",
         "docs/api/index",
         "CONTRIBUTING",
+        "CODE_OF_CONDUCT",
+        "SECURITY",
         "CHANGELOG",
     ),
 }

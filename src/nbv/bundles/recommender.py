@@ -57,10 +57,7 @@ def shipped_bundles() -> dict[str, Path]:
 def bundle_path(name: str | Path) -> Path:
     """Return the path of a shipped bundle of this name, or of a file.
 
-    Raises
-    ------
-    BundleError
-        ``no-bundle`` where there is neither.
+    Raise BundleError ``no-bundle`` where there is neither.
     """
     shipped = shipped_bundles()
     if str(name) in shipped:
@@ -309,6 +306,10 @@ class Recommender:
             )
         logits = self.network(codes)
         score = float(ood_score(self.bundle.ood, codes, logits).max())
+        unusual = (
+            f"frame looks out of distribution (score {score:.1f}, threshold 1): check mask, units "
+            "and category"
+        )
         answer = next_view(
             from_logits(logits, self.bundle.temperature),
             rotations_deg,
@@ -323,22 +324,13 @@ class Recommender:
             answer,
             ood_score=score,
             warnings=(
-                *_ood_warnings(score),
+                *(unusual,) * (score > 1.0),
                 *self.lying_warnings(codes, logits),
                 *_elevation_warnings(self.bundle, elevation_deg),
                 *answer.warnings,
             ),
             crops=tuple(codes),
         )
-
-
-def _ood_warnings(score: float) -> tuple[str, ...]:
-    if score <= 1.0:
-        return ()
-    return (
-        f"frame looks out of distribution (score {score:.1f}, threshold 1): check mask, units "
-        "and category",
-    )
 
 
 def _elevation_warnings(bundle: Bundle, elevation_deg: float | None) -> tuple[str, ...]:

@@ -32,16 +32,10 @@ _SIMILARITY = 0.9
 
 @dataclass(frozen=True)
 class Recording:
-    """Frames of one object, taken from one camera height.
+    """Frames of one object, taken from one camera height, and the intrinsics of each.
 
-    Attributes
-    ----------
-    object_id, sequence : str
-    frames : DataFrame
-        ``path, azimuth_deg`` and, where the manifest has them, ``mask, elevation_deg``, in the
-        order of the manifest.
-    intrinsics : tuple of Intrinsics or None
-        One for each frame.
+    The frames have ``path, azimuth_deg`` and, where the manifest has them, ``mask, elevation_deg``,
+    in the order of the manifest.
     """
 
     object_id: str
@@ -65,14 +59,9 @@ class Recording:
 def read_manifest(path: str | Path) -> list[Recording]:
     """Read a manifest: a CSV file with the columns `REQUIRED`, and any of `OPTIONAL`.
 
-    File names are relative to the manifest's folder. Azimuths are degrees, counter-clockwise
-    around the object seen from above.
-
-    Raises
-    ------
-    UserError
-        Where a column or a file is missing, a file occurs twice in a sequence, or a cell holds an
-        invalid value; it names the row.
+    File names are relative to the manifest's folder. Azimuths are degrees, counter-clockwise around
+    the object seen from above. Raise UserError where a column or a file is missing, a file occurs
+    twice in a sequence, or a cell holds an invalid value; it names the row.
     """
     return recordings_of(Path(path), read_rows(Path(path), REQUIRED))
 
@@ -155,23 +144,9 @@ def run_network(
 ) -> Sweep:
     """Return the crops and logits of a recording; rejected frames are reported and skipped.
 
-    Parameters
-    ----------
-    intrinsics : str or None
-        Intrinsics of frames without any in the manifest; see `nbv.frames.intrinsics.camera_of`.
-    depth_scale : float or None
-        See `nbv.frames.depth_files.read_depth`.
-    report : callable
-        Takes the file of a rejected frame, and the reason.
-    near_m, far_m : float, optional
-        The object lies between them in every frame, metres.
-    mask_value : float, optional
-        See `nbv.frames.depth_files.as_mask`.
-
-    Raises
-    ------
-    UserError
-        Where a file cannot be read, or every frame is rejected.
+    `intrinsics` (`nbv.frames.intrinsics.camera_of`) are of frames without any in the manifest. The
+    object lies between `near_m` and `far_m` in every frame. `report` takes the file of a rejected
+    frame, and the reason. Raise UserError where a file cannot be read, or every frame is rejected.
     """
     codes, kept, focal_px = [], [], []
     doubts: list[str] = []

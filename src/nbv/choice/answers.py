@@ -143,6 +143,8 @@ class Answer(Generic[AnyMove]):
     ) -> Decision:
         """Return whether the pose is good enough, one more view is worth it, or no view helps.
 
+        Raise UserError where a limit is out of range, or the answer does not know what it is about.
+
         Parameters
         ----------
         until_deg : float, optional
@@ -152,11 +154,6 @@ class Answer(Generic[AnyMove]):
             Without limits it is `STOP_PROBABILITY`, if the class has one.
         within_deg : float, optional
             By default `STOP_WITHIN_DEG`.
-
-        Raises
-        ------
-        UserError
-            Where a limit is out of range, or the answer does not know what it is about.
         """
         if until_probability is None and within_deg is not None:
             raise UserError("`within_deg` is for `until_probability`; give that too")

@@ -69,22 +69,12 @@ def at_rotations(
 def best_rotations(
     rotation_deg: NDArray[np.float64], cost: NDArray[np.floating], width: float
 ) -> list[tuple[float, float]]:
-    """Return the local minima of the cost, best first.
+    """Return the local minima of the cost as (rotation, cost), best first.
 
-    Parameters
-    ----------
-    rotation_deg : ndarray (m,)
-        In (-180, 180], ordered by their angle in [0, 360).
-    cost : ndarray (m,)
-        Without NaN.
-    width : float
-        Width of a bin, degrees. Rotations farther apart are not neighbours.
-
-    Returns
-    -------
-    list of (rotation, cost)
-        Rotations with no better neighbour. Equal costs are ordered by travel. All are
-        `MIN_SEPARATION_DEG` or more apart; at most `N_ALTERNATIVES` follow the first.
+    The rotations (m,) are in (-180, 180], ordered by their angle in [0, 360); costs (m,) are
+    without NaN. Rotations farther apart than `width`, that of a bin, are not neighbours. Equal
+    costs are ordered by travel. All minima are `MIN_SEPARATION_DEG` or more apart; at most
+    `N_ALTERNATIVES` follow the first.
     """
     is_near = (np.roll(rotation_deg, -1) - rotation_deg) % 360.0 <= width + 1e-9
     better_after = is_near & (np.roll(cost, -1) < cost)
@@ -135,12 +125,8 @@ def ranked_rotations(
     `max_travel_deg`, and the table's cost of travel counts in the order; here it also travels
     `MIN_SEPARATION_DEG`, where one that does is admissible. The limits are those of
     `nbv.Recommender.recommend`. Warnings are those of `flat_warnings`, and one where calibration
-    estimates do not follow azimuths.
-
-    Raises
-    ------
-    UserError
-        Where the estimate is not an angle, or no rotation is admissible.
+    estimates do not follow azimuths. Raise UserError where the estimate is not an angle, or no
+    rotation is admissible.
     """
     max_travel_deg = min(as_limit_deg("max_travel_deg", max_travel_deg), lookup.max_travel_deg)
     n_bins = len(lookup.cost)

@@ -205,10 +205,7 @@ class MoveOptions:
     def placement(self) -> Placement | None:
         """Return where camera and object are, if both are given.
 
-        Raises
-        ------
-        UserError
-            If only one is given, or is not a pose or an axis.
+        Raise UserError if only one is given, or is not a pose or an axis.
         """
         if self.camera_pose is None and self.axis is None:
             return None
@@ -305,13 +302,8 @@ def check_options(given: Mapping[str, object], known: Sequence[str], of_what: st
 def check_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:
     """Check that the file of an option can be written, before anything is computed.
 
-    Missing folders are made later. Without `kinds`, all suffixes are allowed.
-
-    Raises
-    ------
-    UserError
-        Where the suffix is not allowed, the path is a folder, or its parent is a file or is not
-        writable.
+    Missing folders are made later. Without `kinds`, all suffixes are allowed. Raise UserError where
+    the suffix is not allowed, the path is a folder, or its parent is a file or is not writable.
     """
     if kinds and path.suffix.lower() not in kinds:
         raise UserError(f"{option}={path}: give a name that ends in {' or '.join(kinds)}")

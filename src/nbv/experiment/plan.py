@@ -182,10 +182,7 @@ class Plan:
     def stage(self, stage: Stage) -> dict[str, Any]:
         """Return the settings of a stage. Cross-fitting trains each estimator in fewer epochs.
 
-        Raises
-        ------
-        UserError
-            Where the estimator is not trained.
+        Raise UserError where the estimator is not trained.
         """
         if self.linear:
             kind = self.config["estimator"]["kind"]

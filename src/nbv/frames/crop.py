@@ -101,27 +101,13 @@ def crop_frame(
 ) -> Crop:
     """Return the crop of one object.
 
-    Parameters
-    ----------
-    depth_m : (rows, columns) float32
-        Metres.
-    mask : (rows, columns) bool
-        See `nbv.frames.masks.object_mask`.
-    intrinsics : Intrinsics
-    camera : Camera
-        The camera of the training images.
-    diagonal_m : float
-        Diagonal of the bounding box of a typical object of the category, metres.
-    extent_m : (float, float)
-        Plausible range of the object's extent in the image, metres.
-    is_given : bool
-        Whether the mask was given, and not found in the frame; messages then doubt it first.
+    Raise FrameError ``empty-mask``, ``mask-at-border``, ``other-resolution``,
+    ``implausible-distance`` or ``implausible-size``.
 
-    Raises
-    ------
-    FrameError
-        ``empty-mask``, ``mask-at-border``, ``other-resolution``, ``implausible-distance`` or
-        ``implausible-size``.
+    The mask is that of `nbv.frames.masks.object_mask`, and the camera that of the training images.
+    `diagonal_m` is of the bounding box of a typical object of the category, and `extent_m` the
+    plausible range of its extent in the image. Messages doubt first a mask that `is_given`, and was
+    not found in the frame.
     """
     rows, columns = depth_m.shape
     published, intrinsics = intrinsics, intrinsics.of_size(rows, columns)
@@ -268,11 +254,8 @@ def _facing(
 def check_depth_limits(near_m: float | None, far_m: float | None, diagonal_m: float) -> None:
     """Check that the depth limits of an object with a diagonal are metres.
 
-    Raises
-    ------
-    UserError
-        Where a limit is negative or not a number, excludes all plausible distances, or is too
-        large to exclude anything.
+    Raise UserError where a limit is negative or not a number, excludes all plausible distances, or
+    is too large to exclude anything.
     """
     limits = (("`near_m`", near_m, FARTHEST), ("`far_m`", far_m, _NO_LIMIT))
     for name, limit_m, most in limits:
@@ -294,12 +277,8 @@ def check_plausible_nearest(
 
     In another unit `reach_m` would cut the object to pieces or include everything behind it, and
     the mask would not reveal the mistake. The other parameters are those of
-    `nbv.frames.masks.object_mask`, and the diagonal of the object's bounding box.
-
-    Raises
-    ------
-    FrameError
-        ``implausible-distance``.
+    `nbv.frames.masks.object_mask`, and the diagonal of the object's bounding box. Raise FrameError
+    ``implausible-distance``.
     """
     measured = depth_m[depth_m > (near_m or 0.0)]
     if not measured.size:

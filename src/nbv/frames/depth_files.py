@@ -80,10 +80,7 @@ def read_depth(
 def write_depth(path: Path, depth_m: DepthImage) -> None:
     """Write a depth image: ``.png`` of 16 bits in millimetres, or ``.npy`` in metres.
 
-    Raises
-    ------
-    UserError
-        Where a depth exceeds 16 bits.
+    Raise UserError where a depth exceeds 16 bits.
     """
     if path.suffix.lower() != ".png":
         # An open file, because numpy appends .npy to a name in capitals.
@@ -116,6 +113,9 @@ def as_mask(
 ) -> NDArray[np.bool_]:
     """Return the mask (rows, columns) of one object.
 
+    Raise UserError where values are negative or no numbers, masks differ, several values each fill
+    a region, or none is `mask_value`.
+
     Parameters
     ----------
     mask : (rows, columns), (n, rows, columns) or (rows, columns, n)
@@ -125,12 +125,6 @@ def as_mask(
         Used in messages.
     mask_value : float, optional
         The object's value in an image of labels.
-
-    Raises
-    ------
-    UserError
-        Where values are negative or no numbers, masks differ, several values each fill a region,
-        or none is `mask_value`.
     """
     values = without_single_axes(np.asarray(np.ma.filled(mask, 0)))
     if values.dtype.kind not in _NUMBERS:

@@ -172,10 +172,7 @@ class Intrinsics:
 def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
     """Return intrinsics from (f), (fx, fy, cx, cy), or a 3 × 3 matrix of numbers.
 
-    Raises
-    ------
-    UserError
-        Where the value has none of these forms.
+    Raise UserError where the value has none of these forms.
     """
     if isinstance(value, Intrinsics):
         return value
@@ -227,6 +224,7 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     ``cam_K``, each with or without ``depth_scale``; BOP's ``scene_camera.json``, with a camera for
     each image; ROS's ``CameraInfo`` (``k`` or ``K``); Open3D's ``intrinsic_matrix``; or
     ``camera_matrix`` of ROS or of OpenCV's ``FileStorage``, with its numbers in ``data`` or nested.
+    Raise UserError where the text has none of these forms, or the file has no camera for the frame.
 
     Parameters
     ----------
@@ -235,11 +233,6 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     frame : path
         The number at the end of its stem selects the image in a ``scene_camera.json``, as BOP
         names images. The name does not matter if all images have the same camera.
-
-    Raises
-    ------
-    UserError
-        Where the text has none of these forms, or the file has no camera for the frame.
     """
     if text is None:
         return DepthCamera()

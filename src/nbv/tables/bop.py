@@ -59,6 +59,8 @@ def read_orientation_table(
 ) -> OrientationTable:
     """Read pairs of orientations.
 
+    A UserError names the file and the row.
+
     Parameters
     ----------
     path : path
@@ -78,11 +80,6 @@ def read_orientation_table(
         Estimates of lower scores are left out.
     rows : DataFrame, optional
         The rows of the file, where they have been read.
-
-    Raises
-    ------
-    UserError
-        Names the file and the row.
     """
     path = Path(path)
     given = read_rows(path, ()) if rows is None else rows
@@ -113,7 +110,7 @@ def read_orientation_table(
     ]
     if n_missed := int(missed.sum()):
         left_out.append(f"{n_missed} of {n_missed + len(rows)} instances have no estimate")
-    symmetries = {} if models_info is None else read_models_info(models_info)
+    symmetries = {} if models_info is None else _read_entries(Path(models_info))
     known = set(rows["object_id"])
     for name in objects:
         if name not in known:
@@ -305,12 +302,8 @@ def _read_scenes(folder: Path, wanted: set[str]) -> tuple[pd.DataFrame, set[str]
     return pd.DataFrame(truths, columns=[*KEYS, "R", "t"], dtype=str), images
 
 
-def read_models_info(path: str | Path) -> dict[str, Any]:
-    """Read the entries of BOP's ``models_info.json`` by object."""
-    return _read_entries(Path(path))
-
-
 def _read_entries(path: Path) -> dict[str, Any]:
+    """Read BOP's ``models_info.json`` by object, or ``scene_gt.json`` by image."""
     given = read_given_json(path, remedy := "give a JSON file of BOP")
     if not isinstance(given, dict):
         raise damaged(path, "it is not a JSON object", remedy)

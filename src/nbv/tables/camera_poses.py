@@ -32,21 +32,10 @@ def contradictions(
 ) -> list[str]:
     """Return a warning where views contradict each other in the base frame.
 
-    Where the object is seen tells most mistakes. A mirrored frame moves an object on the optical
-    axis little, but turns it.
-
-    Parameters
-    ----------
-    poses : ndarray (n, 4, 4)
-        Camera to base.
-    seen_m, orientations : ndarray (n, 3) and (n, 3, 3)
-        The object in each camera.
-    symmetry : Symmetry
-
-    Raises
-    ------
-    UserError
-        Where poses of another convention would agree; it is named.
+    Poses (n, 4, 4) are camera to base; `seen_m` (n, 3) and `orientations` (n, 3, 3) are of the
+    object in each camera. Where the object is seen tells most mistakes. A mirrored frame moves an
+    object on the optical axis little, but turns it. Where poses of another convention would agree,
+    a UserError names it.
     """
     distance_m = np.linalg.norm(seen_m, axis=1).mean()
 

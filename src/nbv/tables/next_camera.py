@@ -113,24 +113,11 @@ class PoseEstimate:
 
 @dataclass(frozen=True, kw_only=True)
 class CameraMove(RankedMove):
-    """A candidate camera pose.
+    """A candidate camera pose, with its number from 0.
 
-    Attributes
-    ----------
-    index : int
-        The candidate's number, from 0.
-    travel_deg : float
-        Angle to the last view, about the object.
-    travel_m : float or None
-        Distance to the last view.
-    expected_error_deg : float
-        Expected error of the pose after a view there.
-    probability_within : dict of str to float
-        Probability that the error after this view is below 5, 15 and 30 degrees.
-    target_camera_pose : ndarray (4, 4) or None
-        None where the object's position is unknown.
-    direction : ndarray (3,)
-        Direction from which the object is seen, in the frame of the camera poses.
+    `travel_deg` is the angle to the last view, about the object, and `travel_m` the distance if it
+    is known. `direction` (3,) is that from which the object is seen, in the frame of the camera
+    poses. `target_camera_pose` is None where the object's position is unknown.
     """
 
     index: int
@@ -196,26 +183,6 @@ class CameraRecommendation(Answer[CameraMove]):
         return [f"rotation, {seen} to {camera}", *rows, self.value(self), *bounds, *holds]
 
 
-@dataclass(frozen=True)
-class _Camera:
-    """A camera in the base frame, and the camera at its place that looks straight at the object.
-
-    Attributes
-    ----------
-    pose : ndarray (4, 4)
-        Camera to base.
-    straight_from_camera : ndarray (3, 3)
-        The identity where the object's position or that of calibration is unknown.
-    """
-
-    pose: Pose
-    straight_from_camera: Orientations
-
-    @property
-    def straight_from_base(self) -> Orientations:
-        return np.asarray(self.straight_from_camera @ self.pose[:3, :3].T)
-
-
 def recommend_camera(
     errors: OrientationErrors,
     estimates: Sequence[PoseEstimate],
@@ -231,43 +198,47 @@ def recommend_camera(
     if is_posed and camera_pose is not None:
         raise UserError("the estimates have camera poses; leave `camera_pose` out")
     base = np.eye(4) if camera_pose is None else as_pose(camera_pose)
-    cameras = [
-        _Camera(
-            base if e.camera_pose is None else e.camera_pose,
-            _straightening(e.position_mm, straightened),
-        )
+    cameras = [base if e.camera_pose is None else e.camera_pose for e in estimates]
+    camera, position = cameras[-1], estimates[-1].position_mm
+    # At each camera's place, one that looks straight at the object, if positions are known.
+    straight = [
+        np.eye(3) if e.position_mm is None or not straightened else along_ray(e.position_mm)
         for e in estimates
     ]
-    straight_from_base = np.stack([camera.straight_from_base for camera in cameras])
+    straight_from_base = np.stack(
+        [rotation @ pose[:3, :3].T for rotation, pose in zip(straight, cameras, strict=True)]
+    )
     kept = _different(straight_from_base) if is_posed else np.arange(len(cameras))
     first, last = straight_from_base[kept[0]], straight_from_base[-1]
-    seen = np.stack(
-        [c.straight_from_camera @ e.rotation for c, e in zip(cameras, estimates, strict=True)]
-    )
+    seen = np.stack([s @ e.rotation for s, e in zip(straight, estimates, strict=True)])
     ratio, ratios, warnings = None, np.ones(len(seen)), [NO_SCORES]
     if scores is not None and errors.ratio is not None:
         ratio, ratios, warnings = errors.ratio, errors.ratio(scores), []
     if is_posed:
         now = belief(errors, seen[kept], straight_from_base[kept] @ first.T, ratios[kept])
-        warnings += _contradictions(estimates, errors.symmetry)
+        if position is not None:
+            at_m = [e.position_mm / 1000 for e in estimates if e.position_mm is not None]
+            rotations = np.array([estimate.rotation for estimate in estimates])
+            warnings += contradictions(
+                np.array(cameras), np.array(at_m), rotations, errors.symmetry
+            )
     else:
         order = slice(None) if scores is None else np.argsort(-scores, kind="stable")
         now = hypotheses_belief(errors, seen[order], ratios[order])
-    position = estimates[-1].position_mm
     if n_again := len(seen) - len(kept):
         warnings.append(
             f"{n_again} of {len(seen)} views are within {MIN_SEPARATION_DEG:g}° of a later one and "
             "do not count: the same view repeats its error"
         )
-    if (away_m := np.linalg.norm(cameras[-1].pose[:3, 3])) > FARTHEST_M:
+    if (away_m := np.linalg.norm(camera[:3, 3])) > FARTHEST_M:
         warnings.append(
             f"the camera is {away_m:.0f} m from the origin of the base frame: are its poses in "
             "millimetres? give metres"
         )
-    place = None if position is None else (cameras[-1].pose @ np.append(position / 1000, 1.0))[:3]
+    place = None if position is None else (camera @ np.append(position / 1000, 1.0))[:3]
     in_base = camera_pose is not None or is_posed
     if isinstance(candidates, int):
-        poses, is_known = _sphere(candidates, place, cameras[-1].pose, in_base), place is not None
+        poses, is_known = _sphere(candidates, place, camera, in_base), place is not None
     else:
         given = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
         poses = np.array(given).reshape(-1, 4, 4)
@@ -303,9 +274,7 @@ def recommend_camera(
         CameraMove(
             index=int(free[k]),
             travel_deg=float(travel[free[k]]),
-            travel_m=float(np.linalg.norm(pose[:3, 3] - cameras[-1].pose[:3, 3]))
-            if is_known
-            else None,
+            travel_m=float(np.linalg.norm(pose[:3, 3] - camera[:3, 3])) if is_known else None,
             expected_error_deg=float(cost[k]),
             probability_within=as_chances(within[:, k]),
             target_camera_pose=pose if is_known else None,
@@ -315,7 +284,7 @@ def recommend_camera(
     ]
     within_now = [now.probability_within(error_deg) for error_deg in WITHIN_DEG]
     return CameraRecommendation(
-        rotation=cameras[-1].straight_from_camera.T @ last @ first.T @ now.pose,
+        rotation=straight[-1].T @ last @ first.T @ now.pose,
         expected_error_deg=now.error_deg,
         probability_within=as_chances(within_now),
         moves=tuple(moves),
@@ -363,12 +332,6 @@ def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:
     return np.array(scores) if scores else None
 
 
-def _straightening(position: Array | None, straightened: bool) -> Orientations:
-    if position is None or not straightened:
-        return np.eye(3)
-    return along_ray(position)
-
-
 def known_scores(
     estimates: Sequence[PoseEstimate], calibrated: Array | None
 ) -> tuple[Sequence[PoseEstimate], list[str]]:
@@ -389,15 +352,6 @@ def known_scores(
         "another scale, such as a logit?"
         for score in odd[:1]
     ]
-
-
-def _contradictions(estimates: Sequence[PoseEstimate], symmetry: Symmetry) -> list[str]:
-    positions = [e.position_mm / 1000 for e in estimates if e.position_mm is not None]
-    if not positions:
-        return []
-    poses = np.array([estimate.camera_pose for estimate in estimates])
-    rotations = np.array([estimate.rotation for estimate in estimates])
-    return contradictions(poses, np.array(positions), rotations, symmetry)
 
 
 def _different(straight_from_base: Orientations) -> NDArray[np.intp]:
@@ -461,10 +415,7 @@ def _sphere(n: int, place: Array | None, pose: Pose, in_base: bool) -> Array:
 def as_view(given: Any, name: str, quaternion: str | None = None) -> PoseEstimate:
     """Return a view from a pose of any form, or a mapping with a score and a camera_pose too.
 
-    Raises
-    ------
-    UserError
-        Names what is wrong.
+    A UserError names what is wrong.
     """
     others = given if isinstance(given, Mapping) else {}
     # The class makes arrays of them.

@@ -44,19 +44,9 @@ _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "
 class ObjectSummary:
     """The calibration pairs of one object.
 
-    Attributes
-    ----------
-    object_id : str
-    n_pairs, n_groups, n_flips : int
-        Groups are instances or scenes; a flip errs by more than `FLIP_DEG`.
-    mean_error_deg : float
-    directions_covered : float
-        Share of the viewing directions that have pairs nearby.
-    depends_on_view : bool
-        Whether calibration shows that flips depend on the view.
-    warnings : tuple of str
-    holds_where : str or None
-        For which share of detections calibration holds.
+    Groups are instances or scenes; a flip errs by more than `FLIP_DEG`. `directions_covered` is the
+    share of the viewing directions that have pairs nearby. `depends_on_view` says whether
+    calibration shows that flips do, and `holds_where` for which share of detections it holds.
     """
 
     object_id: str

@@ -27,12 +27,8 @@ def read_pose_folders(
     """Read the estimated and the true pose of each frame from files of the same name.
 
     The frames of a subfolder are a scene. The object is `objects`, by default the folder's name;
-    other parameters are those of `nbv.tables.bop.read_orientation_table`.
-
-    Raises
-    ------
-    UserError
-        Names the file.
+    other parameters are those of `nbv.tables.bop.read_orientation_table`. A UserError names the
+    file.
     """
     if truth is None or not truth.is_dir() or len(objects) > 1 or (models_info and not objects):
         raise UserError(

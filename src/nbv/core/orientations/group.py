@@ -100,13 +100,9 @@ class Symmetry:
         """Return the symmetry of an object's entry in BOP's ``models_info.json``.
 
         An entry without `SYMMETRIES` is asymmetric. A discrete symmetry by nearly the n-th part of
-        a turn, such as one with three decimals, is taken to be by exactly that.
-
-        Raises
-        ------
-        UserError
-            If a key is nearly one of `SYMMETRIES`, a symmetry is no rotation, the rotations form no
-            group of a solid, or the object has more than one axis of continuous symmetry.
+        a turn, such as one with three decimals, is taken to be by exactly that. Raise UserError if
+        a key is nearly one of `SYMMETRIES`, a symmetry is no rotation, the rotations form no group
+        of a solid, or the object has more than one axis of continuous symmetry.
         """
         for key in entry:
             is_like = "sym" in key.lower() or difflib.get_close_matches(key, SYMMETRIES, 1)
