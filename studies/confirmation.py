@@ -1,4 +1,4 @@
-"""Means of methods, and differences between methods, over all trainings."""
+"""Means of methods and their differences, by docs/reference/confirmation/protocol.md."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class Contrast:
     method, other : (str, str, int)
         Choice of views, fusion, number of views.
     question : int
-        The question of docs/protocol.md that this contrast answers; 0 for none.
+        The question of the protocol that this contrast answers; 0 for none.
     """
 
     method: Method
@@ -125,7 +125,7 @@ class Contrast:
 
 
 def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
-    """Return the contrasts of docs/protocol.md between the given methods."""
+    """Return the contrasts of the protocol between the given methods."""
     contrasts = []
     # Questions about a classifier are answered by the product, those of a regressor by averages.
     has_product = any(fusion == "product" for _, fusion, _ in methods)

@@ -1,4 +1,4 @@
-"""Figures of the contrasts between methods over all trainings."""
+"""Figures of the contrasts of docs/reference/confirmation/protocol.md."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _VERDICTS = {_BETTER: (FOR, "o"), _UNDECIDED: (OPEN, "s"), _WORSE: (AGAINST, "X"
 
 @mpl.rc_context(RC)
 def answers_figure(contrasts: pd.DataFrame) -> Figure:
-    """Draw the answers over all categories to the questions of docs/protocol.md.
+    """Draw the answers over all categories to the questions of the protocol.
 
     A heading per question and fusion, and below it a row per data set.
 
@@ -66,7 +66,7 @@ def answers_figure(contrasts: pd.DataFrame) -> Figure:
 
 @mpl.rc_context(RC)
 def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
-    """Draw, by category, the contrasts that answer the questions of docs/protocol.md.
+    """Draw, by category, the contrasts that answer the questions of the protocol.
 
     A row per contrast and fusion, in the order of the questions, with a panel per data set. Same
     parameter and error as `answers_figure`.

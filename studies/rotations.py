@@ -1,4 +1,4 @@
-"""Up to four views of an estimator in three dimensions (docs/decisions-protocol.md).
+"""Up to four views of an estimator in three dimensions (docs/reference/rotations/protocol.md).
 
 Every image of an instance is a first view of `nbv.tables.walks`, in its orders and `halfway`.
 """

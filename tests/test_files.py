@@ -118,3 +118,53 @@ def test_a_pipe_exists_and_is_not_waited_for(tmp_path):
         for read in (files.read_numbers, files.existing, lambda path: files.read_rows(path, ["a"])):
             with pytest.raises(UserError, match=rf"{path} {what}"):
                 read(path)
+
+
+TABLE = "object_id,R_true,t\nNA,1 2,3\n7,4 5,6\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        TABLE.replace(",", ", ").replace("\n", " \n"),
+        TABLE.replace("object_id,R_true,t", "Object_ID,r_TRUE,T"),
+        "# by hand\n# me, you, them\n" + TABLE,
+        "# by hand\n# " + TABLE,
+        TABLE.replace("1 2", '" 1 2"'),
+    ],
+)
+def test_spaces_capitals_and_comments_of_a_table_do_not_count(tmp_path, text):
+    for name, content in (("plain.csv", TABLE), ("t.csv", text)):
+        (tmp_path / name).write_text(content)
+    needed = ["object_id", "R_true", "t"]
+    plain, read = (files.read_rows(tmp_path / n, needed) for n in ("plain.csv", "t.csv"))
+    pd.testing.assert_frame_equal(read, plain)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"a,A,b,B,c\n1,2,3,4,5\n", "no column 'object_id'"),
+        (b"object_id,azimut,t\na,2,3\n", "no column 'azimuth'.* is it 'azimut'"),
+        (b"mug,1,2\nmug,1,2\n", "row 1 holds numbers: put a row of these names above"),
+        (b"1,1,1 2 3,-1e3\n1,1,1 2 3,4\n", "row 1 holds numbers"),
+        (b"object_id, object_id\n1,2\n", "two columns 'object_id'"),
+        (b"\x93NUMPY\x01\x00", "arrays of numpy"),
+    ],
+)
+def test_a_head_that_is_none_is_told(tmp_path, content, message):
+    (tmp_path / "t.csv").write_bytes(content)
+    with pytest.raises(UserError, match=rf"t\.csv.*{message}"):
+        files.read_rows(tmp_path / "t.csv", ["object_id", "azimuth"])
+
+
+def test_a_key_that_is_there_twice_is_named(tmp_path):
+    (tmp_path / "m.json").write_text('{"1": {"b": 2, "a": 1, "b": 3}}')
+    with pytest.raises(UserError, match=r"m\.json: the key 'b' is there twice"):
+        files.read_given_json(tmp_path / "m.json", "give JSON")
+
+
+def test_pickled_objects_are_told_from_other_files(tmp_path):
+    np.save(tmp_path / "p.npy", np.array([{"R": 1}], dtype=object))
+    with pytest.raises(UserError, match=r"p\.npy cannot be read \(it holds Python objects"):
+        files.read_numbers(tmp_path / "p.npy")

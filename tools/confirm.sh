@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The confirmatory run of docs/protocol.md. It takes hours; the same command goes on where it was stopped.
+# The confirmatory run of docs/reference/confirmation/protocol.md. It takes hours; the same command goes on where it was stopped.
 #   MESHES=<folder of airplane, car, chair, toilet> COPIES=<file of ids> adds other people's meshes
 #   MUGS=<ShapeNetCore> WITHOUT_HANDLE=<file of ids> adds their mugs
 #   ESTIMATORS="linear linear_classifier" trains no networks

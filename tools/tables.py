@@ -21,7 +21,7 @@ BUNDLE_ROWS = {
     "mug 1 (real), nearly level": "mug 1, nearly level",
     "mug 1 (real), from above": "mug 1, from above",
     "mug 2 (real), nearly level": "mug 2, nearly level",
-    "mug 2 (real), from above, its zero 10° off": "mug 2, from above",
+    "mug 2 (real), from above, turntable zero 10° off": "mug 2, from above",
 }
 BUNDLE_COLUMNS = {
     "one": ("single", 1),
@@ -156,12 +156,6 @@ def focal_lengths() -> pd.DataFrame:
     return table.rename(columns="{} px".format).rename_axis(None).sort_index(ascending=True)
 
 
-def bundles() -> pd.DataFrame:
-    """Return the part of `bundle` that the first page shows."""
-    shown = {"one": "one view", "opposite": "Opposite", "recommended": "recommended"}
-    return bundle()[[*shown]].rename(columns=shown)
-
-
 def rotations(folder: str) -> pd.DataFrame:
     """Mean errors of an estimator in three dimensions, degrees, and numbers of views."""
     found = pd.read_csv(REFERENCE / folder / "rotations.csv").set_index(["group", "method"])
@@ -197,7 +191,6 @@ TABLES = {
     "confirmation_regressors": partial(confirmation, "regressors", AVERAGED),
     "confirmation_classifiers": partial(confirmation, "classifiers", MULTIPLIED),
     "bundle": bundle,
-    "bundles": bundles,
     "focal_lengths": focal_lengths,
     "rotations": partial(rotations, "rotations"),
     "own_rotations": partial(rotations, "rotation-estimator"),

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 # Messages of libraries about a file, and what they mean for its author; `{…}` is a group.
 _REASONS = (
+    ("Object arrays cannot.*", "it holds Python objects (pickled); save an array of numbers"),
     # numpy takes any other content for pickled objects, and advises to load them unsafely.
     (".*allow_pickle.*", "it is not an array of numbers"),
     ("File is not a zip file", "it is not an .npz file, or only a part of one"),
@@ -94,14 +95,9 @@ class UserError(Exception):
 
 
 class NamedError(UserError):
-    """An error with a name, for programs.
+    """An error with a stable name, such as ``empty-mask``, for programs.
 
-    Attributes
-    ----------
-    name : str
-        A stable name, such as ``empty-mask``, with which the text of the error starts.
-    message : str
-        The text after the name.
+    The text of the error is the name and then the message.
     """
 
     def __init__(self, name: str, message: str) -> None:
@@ -143,8 +139,16 @@ class BundleError(NamedError):
     """
 
 
+def by_number(name: str) -> str:
+    """Return the key by which names are in order of their numbers: 2 before 10."""
+    return re.sub(r"\d+", lambda digits: digits[0].zfill(20), name)
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """Return ``did you mean 'x'?`` if a valid name is close, else ``choose from: a, b, c``."""
-    choices = sorted(valid)
-    close = difflib.get_close_matches(name, choices, n=1, cutoff=0.6)
+    """Return ``did you mean 'x'?`` if a valid name is close, else ``choose from: a, b, c``.
+
+    Numbers are never close, and are listed in their order.
+    """
+    choices = sorted(valid, key=by_number)
+    close = [] if name.isdecimal() else difflib.get_close_matches(name, choices, n=1, cutoff=0.6)
     return f"did you mean {close[0]!r}?" if close else f"choose from: {', '.join(choices)}"

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import bz2
 import csv
+import difflib
 import errno
 import gzip
 import hashlib
 import io
 import json
 import lzma
+import re
 import secrets
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from glob import escape
@@ -34,6 +37,8 @@ RUN_AGAIN = "delete the file and run the same command again"
 CALIBRATE_AGAIN = f"make it again with nbv calibrate, or for a file of a run, {RUN_AGAIN}"
 """Remedy for a damaged table of nbv calibrate or of a run."""
 
+
+_NUMBERS = re.compile(r"[-+.\d][-+.\deE ]*")
 
 _COMPRESSED: Mapping[str, Any] = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
 
@@ -87,13 +92,7 @@ def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
 
 @contextmanager
 def readable(path: str | Path, remedy: str = RUN_AGAIN) -> Iterator[None]:
-    """Convert any error of a reader into a UserError that names the file, and a remedy.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, or the block cannot read it.
-    """
+    """Convert any error of a reader into a UserError that names the file, and a remedy."""
     try:
         yield
     except UserError:
@@ -137,18 +136,8 @@ def calibrated_file(path: str | Path) -> Path:
 def stored_table(path: str | Path, names: Iterable[str], kind: str) -> Iterator[Arrays]:
     """Yield the arrays of a table of nbv calibrate or of a run, for checks with its remedy.
 
-    Parameters
-    ----------
-    path : path
-    names : iterable of str
-        Arrays that every table of this kind has.
-    kind : str
-        What such a table holds, for messages.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read, is of another kind, or the block raises any error.
+    Every table of this kind has arrays of these names; `kind` is what it holds, for messages. Raise
+    UserError if the file cannot be read, is of another kind, or the block raises any error.
     """
     arrays = read_arrays(calibrated_file(path), (), CALIBRATE_AGAIN)
     if not set(names) <= set(arrays):
@@ -218,11 +207,13 @@ def read_text(path: Path) -> str:
     Raises
     ------
     UserError
-        If a line is not UTF-8.
+        If the file holds arrays of numpy, or a line is not UTF-8.
     OSError
         If the file cannot be read.
     """
     content = path.read_bytes()
+    if content.startswith((b"\x93NUMPY", b"PK")):
+        raise UserError(f"{path} holds arrays of numpy (.npy, .npz); give a text file")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -234,17 +225,9 @@ def read_text(path: Path) -> str:
 def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
     """Read a user's CSV file as text, so that an object may be called NA.
 
-    Parameters
-    ----------
-    path : path
-    needed : sequence of str
-        Required columns.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read, a column is missing or occurs twice, there are no rows, or a
-        row has more or fewer values than the head.
+    Spaces around a cell do not count, nor do capitals in the head and comments (#) before it. Raise
+    UserError if the file cannot be read, a needed column is missing, one occurs twice, there are no
+    rows, or a row has more or fewer values than the head.
     """
     import pandas as pd  # here, so that loading a lookup table costs no import of pandas
 
@@ -255,19 +238,24 @@ def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
         opened = _COMPRESSED.get(path.suffix)
         text = opened(path, "rt", encoding="utf-8-sig").read() if opened else read_text(path)
         # Not by pandas, which pads a short row and takes the first of too many values for an index.
-        rows = list(filter(None, csv.reader(io.StringIO(text, newline=""), strict=True)))
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True, skipinitialspace=True)
+        rows = [[cell.strip() for cell in row] for row in reader if row]
     except (OSError, ValueError, EOFError, csv.Error, lzma.LZMAError) as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     if not rows:
         raise UserError(f"{path} is empty; it needs {wanted}")
-    head = rows[0]
+    # A comment above numbers is the head, as numpy.savetxt writes it.
+    while rows[1:] and rows[0][0].startswith("#") and not any(map(_NUMBERS.fullmatch, rows[1])):
+        rows.pop(0)
+    head = _plain_names(rows[0])
     for i, row in enumerate(rows, start=1):
         if len(row) != len(head):
             raise UserError(
                 f"{path}, row {i}: {len(row)} values and the head has {len(head)}: separate them "
                 "by commas, write 0.5 and not 0,5, and quote a value that holds a comma"
             )
-    if twice := [name for name in head if name and head.count(name) > 1]:
+    names = [name for name in head if name and not _NUMBERS.fullmatch(name)]
+    if twice := [name for name in names if names.count(name) > 1]:
         raise UserError(f"{path}: two columns {twice[0]!r}; leave one of them out")
     table = pd.DataFrame(rows[1:], columns=head, dtype=str)
     need_columns(path, table, needed)
@@ -276,33 +264,36 @@ def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
     return table
 
 
+def _plain_names(head: Sequence[str]) -> list[str]:
+    """Return names of columns in the project's case, unless two of them differ in case alone."""
+    names = [head[0].lstrip("# "), *head[1:]]
+    plain = [re.sub(r"^r(?=$|_)", "R", name.lower()) for name in names]
+    return [p if plain.count(p) == 1 else name for p, name in zip(plain, names, strict=True)]
+
+
 def need_columns(path: Path, table: pd.DataFrame, needed: Sequence[str]) -> None:
     """Raise UserError if a user's table lacks a needed column; see `read_rows`."""
+    given = list(map(str, table))
     for name in needed:
-        if name not in table:
-            hint = "; separate columns by commas" if table.shape[1] == 1 else ""
+        if name not in given:
+            near = difflib.get_close_matches(name, given, 1)
+            hint = f"; is it {near[0]!r}? then rename that" if near else ""
+            if len(list(filter(_NUMBERS.fullmatch, given))) > len(given) / 2:
+                hint = "; row 1 holds numbers: put a row of these names above it"
+            elif len(given) == 1:
+                hint = "; separate columns by commas"
             raise UserError(f"{path}: no column {name!r}; it needs {', '.join(needed)}{hint}")
 
 
 def read_numbers(path: Path) -> NDArray[Any]:
-    """Read the numbers of a user's file: ``.npy``, ``.json``, or text.
+    """Read the numbers of a user's ``.npy`` file.
 
-    Raises
-    ------
-    UserError
-        If the file does not exist or cannot be read.
+    Raise UserError if the file does not exist or cannot be read.
     """
     if not path.is_file():
         raise UserError(f"{path} {missing(path)}")
     try:
-        if path.suffix.lower() == ".npy":
-            return np.asarray(np.load(path, allow_pickle=False))
-        text = read_text(path)
-        if path.suffix.lower() == ".json":
-            return np.asarray(json.loads(text), dtype=np.float64)
-        return np.array([float(number) for number in text.replace(",", " ").split()])
-    except UserError:
-        raise
+        return np.asarray(np.load(path, allow_pickle=False))
     # A reader may raise any exception on arbitrary bytes.
     except Exception as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
@@ -313,10 +304,7 @@ def read_arrays(
 ) -> dict[str, NDArray[Any]]:
     """Read an `.npz` of `write_arrays`, with the errors of `readable`.
 
-    Raises
-    ------
-    UserError
-        If one of the arrays `names` is missing.
+    Raise UserError if one of the arrays `names` is missing.
     """
     with readable(path, remedy), np.load(path, allow_pickle=False) as stored:
         arrays = {name: stored[name] for name in stored.files}
@@ -356,8 +344,16 @@ def read_given_json(path: Path, remedy: str) -> Any:
     """Read a user's JSON file; raise UserError with the remedy where it is none."""
     if not path.is_file():
         raise UserError(f"{path} {missing(path)}")
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        made = dict(pairs)
+        if len(made) < len(pairs):
+            again = Counter(name for name, _ in pairs).most_common(1)[0][0]
+            raise UserError(f"{path}: the key {again!r} is there twice; keep one")
+        return made
+
     with readable(path, remedy):
-        return json.loads(read_text(path))
+        return json.loads(read_text(path), object_pairs_hook=once)
 
 
 def existing(path: str | Path) -> Path:

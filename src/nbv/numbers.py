@@ -1,28 +1,31 @@
-"""Numbers, poses and orientations from users: as arguments, in files, and in columns of CSV files.
+"""Numbers and orientations from users: as arguments, and in columns of CSV files.
 
-A pose is a 4 × 4 matrix that maps points from the camera's frame to the base frame, in metres. An
-orientation is a rotation matrix, object to camera.
+An orientation is a rotation matrix, object to camera.
 """
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.errors import UserError
-from nbv.files import read_numbers
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
-Pose = NDArray[np.float64]
 
 ORIENTATION_TOLERANCE = 1e-3
 """Most that an entry of R Rᵀ may differ from the identity: files have six digits."""
+
+ROUNDED_DEG = 0.2
+"""A matrix nearer to a rotation is that rotation, printed with three decimals or so."""
+
+ROUNDED = "rotations have few decimals: the nearest ones are taken"
 
 LARGEST_M = 1e6
 """Largest coordinate of a pose or an axis in the base frame; a larger one is in another unit."""
@@ -37,15 +40,12 @@ FARTHEST_M = 50.0
 def as_finite(values: ArrayLike, name: str, n: int, hint: str = "") -> Array:
     """Return n finite numbers (n,), from an array of any shape or from texts.
 
-    Raises
-    ------
-    UserError
-        If there are not n numbers, or one is not finite; `hint` ends the message.
+    Raise UserError if there are not n numbers, or one is not finite; `hint` ends the message.
     """
     try:
         given = np.asarray(values)
         numbers = np.empty(0) if np.iscomplexobj(given) else given.astype(np.float64).ravel()
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = np.empty(0)
     if len(numbers) != n or not np.isfinite(numbers).all():
         what = "a finite number" if n == 1 else f"{n} finite numbers"
@@ -64,10 +64,7 @@ def as_point(values: ArrayLike, name: str) -> Array:
 def as_position(values: ArrayLike, name: str) -> Array:
     """Return the position (3,) of an object in the camera's frame, millimetres.
 
-    Raises
-    ------
-    UserError
-        If the camera cannot see an object there.
+    Raise UserError if the camera cannot see an object there.
     """
     position = as_finite(values, name, 3)
     if position[2] <= 0:
@@ -75,22 +72,23 @@ def as_position(values: ArrayLike, name: str) -> Array:
             f"{name} is behind the camera (z = {position[2]:g}): give the pose object to camera, "
             "not camera to object"
         )
-    if (distance := float(np.linalg.norm(position))) < LEAST_MM:
+    if (distance := math.hypot(*position)) < LEAST_MM:
         raise UserError(f"{name} is {distance:g} mm away; give mm, not metres")
+    if distance > 1000 * LARGEST_M:
+        raise UserError(f"{name} is {distance:g} mm away; give mm")
     return position
 
 
 def as_orientations(values: ArrayLike, name: str) -> Array:
     """Return rotation matrices (..., 3, 3).
 
-    Raises
-    ------
-    UserError
-        Names the first matrix that is not a rotation, and why.
+    A matrix that is a rotation within `ORIENTATION_TOLERANCE` stays as it is. Others are replaced
+    by the nearest rotation if it is within `ROUNDED_DEG`: ‖R - R₀‖ / √2, Frobenius norm. A
+    UserError names the first matrix that is not a rotation, and why.
     """
     try:
         array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise UserError(f"{name} has an entry that is not a number") from None
     if array.shape[-2:] != (3, 3):
         raise UserError(f"{name} is {array.shape} instead of (..., 3, 3)")
@@ -98,6 +96,15 @@ def as_orientations(values: ArrayLike, name: str) -> Array:
     flat = np.clip(array.reshape(-1, 3, 3), -2.0, 2.0)
     skewed = np.abs(flat @ flat.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2))
     skewed = np.asarray(~(skewed <= ORIENTATION_TOLERANCE))
+    if skewed.any():
+        u, _, vt = np.linalg.svd(np.nan_to_num(flat))
+        apart = np.linalg.norm(u @ vt - flat, axis=(1, 2)) / np.sqrt(2)
+        is_rounded = skewed & (apart <= np.radians(ROUNDED_DEG))
+        flat = np.where(is_rounded[:, None, None], u @ vt, flat)
+        array = np.where(
+            is_rounded.reshape((*array.shape[:-2], 1, 1)), flat.reshape(array.shape), array
+        )
+        skewed &= ~is_rounded
     reflected = ~skewed & (np.linalg.det(np.where(skewed[:, None, None], 0, flat)) < 0)
     for bad, reason in (
         (skewed, "not a rotation: its rows are not perpendicular unit vectors"),
@@ -107,46 +114,6 @@ def as_orientations(values: ArrayLike, name: str) -> Array:
             row = f"[{np.argmax(bad)}]" if array.ndim > 2 else ""
             raise UserError(f"{name}{row} is {reason}")
     return array
-
-
-def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
-    """Return a 4 × 4 pose, from (4, 4) or its 16 numbers row by row.
-
-    Raises
-    ------
-    UserError
-        If the matrix is not a rotation with a translation in metres.
-    """
-    pose = as_finite(values, name, 16, "; give a 4 × 4 matrix row by row").reshape(4, 4)
-    if (np.abs(pose[3] - [0, 0, 0, 1]) > [1e-9, 1e-9, 1e-9, 1e-5]).any():
-        row = " ".join(f"{number:g}" for number in pose[3])
-        raise UserError(
-            f"{name}: the last row is {row}, but a pose has 0 0 0 1; is it transposed or scaled?"
-        )
-    as_orientations(pose[:3, :3], f"{name}: the upper left 3 × 3 matrix")
-    as_point(pose[:3, 3], f"{name}: the translation")
-    return pose
-
-
-def read_poses(path: str | Path) -> list[Pose]:
-    """Read poses (n, 4, 4) from ``.npy``, ``.json`` or text with 16 numbers each.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read, or as in `as_pose`.
-    """
-    path = Path(path)
-    numbers: NDArray[Any] = read_numbers(path)
-    if not numbers.size or numbers.size % 16:
-        raise UserError(f"{path}: {numbers.size} numbers; give the 16 of each 4 × 4 matrix")
-    return [as_pose(pose, f"{path}, pose {i}") for i, pose in enumerate(numbers.reshape(-1, 16))]
-
-
-def read_pose(path: str | Path) -> Pose:
-    """Read a pose from ``.npy``, ``.json``, or text with 16 numbers; errors as in `as_pose`."""
-    path = Path(path)
-    return as_pose(read_numbers(path), str(path))
 
 
 def column(
@@ -160,24 +127,9 @@ def column(
 ) -> Array:
     """Return the numbers in the cells of a column of a file: (rows,), or (rows, n) where n > 1.
 
-    Parameters
-    ----------
-    path : path
-        The file, for messages.
-    rows : DataFrame
-        Texts; the index counts the rows of the file from 0.
-    name : str
-    n : int
-        How many numbers, separated by spaces, a cell has.
-    limit : float
-        Largest magnitude of a number.
-    is_optional : bool
-        Whether cells may be empty, which gives NaN.
-
-    Raises
-    ------
-    UserError
-        Names the row of a cell with something else.
+    The rows are texts, and their index counts the rows of the file from 0. A cell has n numbers,
+    separated by spaces, of a magnitude up to `limit`; if it `is_optional`, it may be empty, which
+    gives NaN. A UserError names the row of a cell with something else.
     """
     numbers = np.full((len(rows), n), np.nan)
     for i, (row, text) in enumerate(zip(rows.index, rows[name], strict=True)):

@@ -98,6 +98,40 @@ def test_tables_scroll_in_their_own_box_and_keep_the_first_column(visit, path):
         assert found["paper"] != "rgba(0, 0, 0, 0)"
 
 
+def test_narrow_tables_show_proposed_first_and_that_there_is_more(visit, path):
+    page = visit(path, width=390)
+    for box in page.locator("#tables .scroll").all():
+        place = box.bounding_box()
+        column = box.locator("td.in-sight").first.bounding_box()
+        assert column["x"] + column["width"] <= place["x"] + place["width"] + 1
+        first = box.locator("tbody th").first.bounding_box()
+        assert column["x"] > first["x"] + first["width"]
+        hint = box.evaluate("one => getComputedStyle(one, '::before').content")
+        assert "more" in hint
+    wide = visit(path).locator("#table1 .scroll")
+    assert wide.evaluate("one => getComputedStyle(one, '::before').content") == "none"
+
+
+def test_no_word_of_a_heading_breaks(visit, path):
+    broken = """all => all.filter(cell => {
+        const text = cell.firstChild, range = document.createRange();
+        return [...text.data.matchAll(/\\p{L}+/gu)].some(word => {
+            range.setStart(text, word.index);
+            range.setEnd(text, word.index + word[0].length);
+            return range.getClientRects().length > 1;
+        });
+    }).map(cell => cell.textContent)"""
+    page = visit(path, width=390)
+    assert page.locator("#tables thead th").evaluate_all(broken) == []
+
+
+def test_one_button_opens_every_claim_and_is_absent_where_scripts_are_forbidden(visit, path):
+    page = visit(path)
+    page.get_by_role("button").click()
+    assert page.locator("#claims details:not([open])").count() == 0
+    assert visit(path, java_script_enabled=False).locator("button").is_hidden()
+
+
 def test_the_keyboard_goes_from_top_to_bottom_and_scrolls_tables(visit, path):
     page = visit(path, width=390)
     focus = "(e => [e.className, e.getBoundingClientRect().top + scrollY])(document.activeElement)"

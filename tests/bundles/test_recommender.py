@@ -607,6 +607,8 @@ def test_a_frame_may_be_given_in_many_forms(recommender):
         hole,
         np.where(depth > 0, depth, -1.0),
         depth[:, :, None],
+        depth[None, None],
+        depth[None, :, :, None],
         depth.tolist(),
         np.asfortranarray(depth),
     ):
@@ -617,7 +619,9 @@ def test_a_frame_may_be_given_in_many_forms(recommender):
 def test_several_frames_may_be_a_list_or_an_array(recommender):
     rotations = [0.0, 60.0, -60.0]
     wanted = recommender.recommend(FRAMES[:3], rotations_deg=rotations)
-    same(recommender.recommend(np.stack(FRAMES[:3]), rotations_deg=rotations), wanted)
+    stack = np.stack(FRAMES[:3])
+    for given_ in (stack, stack[:, None]):
+        same(recommender.recommend(given_, rotations_deg=rotations), wanted)
     same(recommender.recommend(tuple(FRAMES[:3]), rotations_deg=np.array(rotations)), wanted)
     crops = np.stack([recommender.crop(depth).codes for depth in FRAMES[:3]])
     same(recommender.recommend_crops(crops, rotations), wanted)
@@ -747,14 +751,31 @@ def test_distributions_are_those_of_the_logits(recommender):
     assert belief == pytest.approx(wanted[0], rel=1e-4)
 
 
-def test_an_object_that_lies_on_its_side_gets_a_warning():
-    """More of the views that are rotated by 90° than of the upright ones."""
+def test_an_object_that_is_not_upright_gets_a_warning():
+    """Of the views that are rotated more than of the upright ones, and by how much."""
     recommender = Recommender.load("mug")
-    told = {0: 0, 1: 0}
+    told = {0: 0, 1: 0, 2: 0}
     for azimuth_deg in range(0, 360, 90):
-        drawn = draw_frame(example_mesh(), azimuth_deg, 15.0, 0.8, 0.17)
-        for quarters in told:
+        for quarters, elevation_deg in ((0, 15.0), (0, 30.0), (1, 15.0), (2, 30.0)):
+            drawn = draw_frame(example_mesh(), azimuth_deg, elevation_deg, 0.8, 0.17)
             answer = recommender.recommend(np.rot90(drawn.depth_m, quarters), intrinsics=(585.0,))
-            told[quarters] += any("up is up" in warning for warning in answer.warnings)
+            what = f"rotate the frame by {90 * quarters}°" if quarters else "up is up"
+            told[quarters] += any(what in warning for warning in answer.warnings)
     assert told[0] == 0
-    assert told[1] >= 2
+    assert min(told[1], told[2]) >= 2
+
+
+def test_a_unit_that_shows_a_more_usual_size_is_told():
+    """In tenths of a millimetre the mug and a board 0.3 m behind it look like one small object."""
+    recommender = Recommender.load("mug")
+    drawn = draw_frame(example_mesh(), 0.0, 15.0, 2.5, 0.17, sensor="none")
+    right = drawn.depth_m.copy()
+    board = right[140:340, 260:380]
+    board[board == 0] = 2.8
+    told = {}
+    for unit in (1.0, 0.1):
+        crop = recommender.crop(right * np.float32(unit), intrinsics=drawn.intrinsics)
+        told[unit] = [doubt for doubt in crop.doubts if "times as large" in doubt]
+    assert told[1.0] == []
+    assert len(told[0.1]) == 1
+    assert "depths 10 times as large it would be 0.1" in told[0.1][0]

@@ -260,7 +260,10 @@ def test_a_recording_without_a_usable_frame_is_one_line(recommender, folder):
 def test_a_mistyped_optional_column_is_refused_and_others_may_stand(folder):
     for name in ("elevation", "elevaton_deg", "Elevation_dg"):
         message = refused(manifest(folder, table(**{name: ["1"] * 4})))
-        assert f"a column {name!r}; call it 'elevation_deg' if it is that, or remove it" in message
+        assert (
+            f"a column {name.lower()!r}; call it 'elevation_deg' if it is that, or remove it"
+            in message
+        )
     for name in ("note", "task", "elevation_rad", "elevation_mm", "declination_deg", "mask_id"):
         assert read_manifest(manifest(folder, table(**{name: ["1"] * 4})))
 
@@ -281,6 +284,19 @@ def test_masks_are_used_where_there_are_any(recommender, folder):
     assert np.array_equal(sweep.logits, logits)
     _, lines = seen(recommender, manifest(folder, table()))
     assert len(lines) == 1
+
+
+def test_a_value_names_the_object_in_masks_of_labels(recommender, folder):
+    for place in range(4):
+        labels = 2 * (frame(place) > 0).astype(np.uint8)
+        labels[:8, :8] = 1
+        Image.fromarray(labels).save(folder / f"m{place}.png")
+    path = manifest(folder, table(mask=[f"m{place}.png" for place in range(4)]))
+    (recording,) = read_manifest(path)
+    sweep = run_network(recommender, recording, None, None, told([]), mask_value=2)
+    assert np.array_equal(sweep.codes, crops(recommender, range(4)))
+    with pytest.raises(UserError, match=r"m0\.png: which value is the object\?"):
+        seen(recommender, path)
 
 
 def test_intrinsics_of_a_frame_come_before_those_of_all(recommender, folder):

@@ -76,6 +76,8 @@ def test_without_an_error_there_is_no_decision():
         ((5.0, None, 5.0), "`within_deg` is for `until_probability`"),
         ((None, 1.0), "`until_probability`=1: give one between 0 and 1"),
         ((None, math.nan), "`until_probability`=nan"),
+        ((math.nan,), "`until_deg`=nan: give degrees, 0 or more"),
+        ((-5.0,), "`until_deg`=-5.0: give degrees, 0 or more"),
     ],
 )
 def test_a_limit_that_cannot_be_used_is_named(limits, message):

@@ -23,7 +23,7 @@ from nbv.choice.moves import (
 )
 from nbv.data.camera import viewpoint_frames
 from nbv.errors import FrameError, UserError
-from nbv.numbers import read_pose
+from nbv.poses import read_pose
 from random_poses import random_pose, seeds
 
 points = arrays(np.float64, (3,), elements=st.floats(-3, 3))
@@ -184,6 +184,12 @@ def test_gravity_does_not_point_up_in_the_image(down):
         elevation_from_gravity(down)
 
 
+def test_a_camera_that_looks_straight_up_may_be_an_accelerometers_sign():
+    (warning,) = roll_warnings([0, 0, -9.81])
+    assert "reverse all three signs" in warning
+    assert roll_warnings([0, 0, 9.81]) == roll_warnings([0, 9.81, 0]) == ()
+
+
 @given(
     elevation=st.floats(-80, 79),
     azimuth=st.floats(0, 360),
@@ -271,7 +277,7 @@ def damaged_poses() -> dict[str, bytes]:
 def test_a_damaged_file_is_named_in_one_line(tmp_path, name):
     (tmp_path / name).write_bytes(damaged_poses()[name])
     with pytest.raises(UserError, match=name) as error:
-        read_pose(tmp_path / name)
+        _ = read_pose(tmp_path / name).camera_pose
     assert "\n" not in str(error.value)
     with pytest.raises(UserError, match=name) as error:
         read_rotations(tmp_path / name)

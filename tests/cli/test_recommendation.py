@@ -1,7 +1,9 @@
 """`nbv recommend`: its answers, options and mistakes."""
 
 import json
+import lzma
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,8 @@ from nbv.bundles.bundle import Bundle
 from nbv.bundles.recommender import Recommender
 from nbv.choice.moves import elevation_from_gravity, moved_camera
 from nbv.frames.depth_files import read_depth
+
+CASES = Path(__file__).parents[3] / "shared" / "cases"
 
 
 def test_a_recommendation_as_json_is_that_of_the_recommender(here, capsys):
@@ -219,7 +223,47 @@ def test_an_ood_frame_gives_a_warning(here, bundle, capsys, limit, is_told):
             ["f0.npy", "--gravity", "0,1,0", "--elevation", "0"],
             "--gravity and --elevation: give one",
         ),
+        (["f0.npy", "--mask-value", "1"], "--mask-value goes with --mask"),
     ],
 )
 def test_what_cannot_be_recommended_is_one_line(here, capsys, arguments, message):
     assert message in fails(capsys, "recommend", *arguments, "--bundle", "b.safetensors")
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="../shared/cases is absent")
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (["2/mask_rgba_dark/wall.npz", "--mask", "2/mask_rgba_dark/dark.png"], 0.4),
+        (["2/mask_labels/box_r60x60.npz", "--mask", "2/mask_labels/lab3.png"], "which value is"),
+        (["2/mask_labels/box_r60x60.npz", "--mask", "2/mask_labels/box_r60x60.png"], "which value"),
+        (
+            ["2/mask_labels/box_r60x60.npz", "--mask", "2/mask_labels/lab3.png", "--mask-value=1"],
+            0.4,
+        ),
+        (["wall.npz", "--mask", "2/mask_logits/neg.npy"], "has negative values, such as -1"),
+        (["wall.npz", "--mask", "2/mask_logits/log.npy"], "has negative values, such as -5"),
+        (["wall.npz", "--mask", "2/mask_logits/neg.npy", "--mask-value", "3"], 0.4),
+        (["2/depth_1hw/1hw.npy"], 0.4),
+        (["2/depth_1hw/11hw.npy"], 0.4),
+        (["side.npz", "--intrinsics", "585,319.5,585,239.5"], "give 585,585,319.5,239.5"),
+        (["side.npz", "--intrinsics", "1170,1170,620,470"], "the centre of an image of 1241 × 941"),
+    ],
+)
+def test_the_given_cases_are_answered_rightly_or_in_one_line(
+    tmp_path, monkeypatch, capsys, arguments, wanted
+):
+    for packed in [*CASES.glob("2/mask_*/*.xz"), *CASES.glob("2/depth_*/*.xz")]:
+        (tmp_path / packed.parent.relative_to(CASES)).mkdir(parents=True, exist_ok=True)
+        (tmp_path / packed.relative_to(CASES).with_suffix("")).write_bytes(
+            lzma.decompress(packed.read_bytes())
+        )
+    monkeypatch.chdir(tmp_path)
+    files = [a if Path(a).exists() or not (CASES / a).exists() else CASES / a for a in arguments]
+    if "--intrinsics" not in arguments:
+        files += ["--intrinsics", "585,585,319.5,239.5"]
+    if isinstance(wanted, str):
+        assert wanted in fails(capsys, "recommend", *files)
+    else:
+        answer = json.loads(run(capsys, "recommend", *files, "--json"))
+        assert answer["azimuth_deg"] == pytest.approx(wanted, abs=0.1)

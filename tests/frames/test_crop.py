@@ -272,6 +272,22 @@ def test_an_object_that_is_cut_off_is_refused(row, column, border):
     cropped(inward, intrinsics=WIDE)
 
 
+def test_a_mask_that_covers_the_frame_is_not_told_to_give_far():
+    depth = np.full((60, 80), 0.6, dtype=np.float32)
+    message = refused("mask-at-border", depth, intrinsics=WIDE, is_given=True)
+    assert "the mask touches the top and bottom and left and right border" in message
+    assert "covers 100 % of it: mask only the object" in message
+    assert "far_m" not in message
+
+
+def test_a_size_that_is_not_plausible_doubts_a_given_mask_before_the_unit():
+    depth = frame(20.0, 200.0, 4.5) * DIAGONAL_M * 4
+    for is_given in (False, True):
+        message = refused("implausible-size", depth, extent_m=EXTENT_M, is_given=is_given)
+        assert ("does the mask hold the object alone?" in message) == is_given
+        assert "0.25" in factors_of(message)
+
+
 def test_every_border_that_cuts_the_object_is_named():
     depth = np.full((60, 80), 0.6, dtype=np.float32)
     message = refused("mask-at-border", depth, intrinsics=WIDE)

@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
+from scipy import ndimage
 
 from nbv.errors import FrameError, UserError
-from nbv.frames.depth_files import read_depth, read_mask, to_metres, write_depth
+from nbv.frames.depth_files import as_mask, read_depth, read_mask, to_metres, write_depth
 
 MILLIMETRES = np.array([[0, 1, 400], [1234, 10000, 65534]], dtype=np.uint16)
 METRES = MILLIMETRES.astype(np.float32) * np.float32(0.001)
@@ -131,8 +132,9 @@ def test_a_mask_is_the_array_called_mask(tmp_path):
         read_mask(tmp_path / "b.npz")
 
 
-def test_a_channel_of_its_own_is_no_colour(tmp_path):
-    found = read_depth(saved(tmp_path / "a.npy", MILLIMETRES[:, :, None]))
+@pytest.mark.parametrize("axes", [0, 2, (0, 1), (0, 3)])
+def test_axes_of_length_1_are_no_colours_and_no_frames(tmp_path, axes):
+    found = read_depth(saved(tmp_path / "a.npy", np.expand_dims(MILLIMETRES, axes)))
     assert np.array_equal(found, METRES)
 
 
@@ -360,3 +362,117 @@ def test_a_mask_has_rows_and_columns(tmp_path):
         read_mask(saved(tmp_path / "b.npy", np.array([["a"]])))
     with pytest.raises(UserError, match="give a mask of numbers"):
         read_mask(saved(tmp_path / "c.npy", np.zeros((2, 2), "f4,i4")))
+
+
+# Masks of many forms: which object, or a question
+
+MUG, BOX = np.s_[6:30, 8:30], np.s_[10:30, 30:50]
+
+
+def labelled(mug=1, box=2, background=0, dtype=np.uint8):
+    """Two objects that touch."""
+    values = np.full((40, 60), background, dtype=dtype)
+    values[MUG], values[BOX] = mug, box
+    return values
+
+
+ONE, MANY = labelled(box=0) == 1, labelled()
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        labelled(1, 2),
+        labelled(24001, 26000, dtype=np.uint16),
+        labelled(1.0, 3.0, dtype=np.float32),
+        labelled(255, 128),
+        labelled(7, 9, dtype=np.int64)[None],
+        np.moveaxis([labelled()] * 3, 0, 2),
+    ],
+    ids=["uint8", "instances", "float", "grey", "batch", "three channels"],
+)
+def test_of_several_labels_one_has_to_be_named(tmp_path, values):
+    path, mug = saved(tmp_path / "a.npy", values), float(np.squeeze(values)[10, 10].ravel()[0])
+    with pytest.raises(
+        UserError, match=rf"a\.npy: which value is the object\? .*{mug:g} \(528 pix"
+    ):
+        read_mask(path)
+    assert np.array_equal(read_mask(path, mug), ONE)
+    with pytest.raises(UserError, match=r"`mask_value`=77: no pixel of .*a\.npy has it"):
+        read_mask(path, 77)
+
+
+@pytest.mark.parametrize("kind", ["palette", "colours", "grey RGB", "RGBA"])
+def test_a_label_image_may_have_colours(tmp_path, kind):
+    made, mug = Image.fromarray(MANY), 1
+    if kind == "palette":
+        made.putpalette([0, 0, 0, 128, 0, 0, 0, 128, 0])
+    elif kind == "colours":
+        made, mug = (
+            Image.fromarray(np.array([[0, 0, 0], [128, 0, 0], [0, 128, 0]], np.uint8)[MANY]),
+            128 << 16,
+        )
+    else:
+        made = made.convert(kind.split()[-1])
+    made.save(tmp_path / "a.png")
+    with pytest.raises(UserError, match=rf"which value is the object\? .*{mug} \(528 pixels\)"):
+        read_mask(tmp_path / "a.png")
+    assert np.array_equal(read_mask(tmp_path / "a.png", mug), ONE)
+
+
+def test_soft_edges_are_no_labels():
+    """A blurred, an enlarged and a shaded mask, and masked depth: what is not 0, as it was."""
+    sharp = 255.0 * ONE
+    for soft in (
+        *(ndimage.gaussian_filter(sharp, sigma) for sigma in (0.7, 2.0, 5.0)),
+        *(ndimage.zoom(sharp, zoom, order=1) for zoom in (2, 4)),
+        sharp + np.linspace(-60, 0, 60) * ONE,
+    ):
+        grey = np.rint(soft).astype(np.uint8)
+        assert np.array_equal(as_mask(grey), grey > 0)
+    down, across = np.mgrid[:40, :60]
+    bowl = 700 + ((across - 19) ** 2 + (down - 18) ** 2) // 9
+    assert np.array_equal(as_mask(np.where(ONE, bowl, 0)), ONE)
+
+
+def test_fractions_are_above_a_half(rng):
+    values = rng.random((40, 60))
+    assert np.array_equal(as_mask(values.astype(np.float32)[None]), values > 0.5)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.int64, np.int8])
+def test_negative_values_are_thresholded_first(dtype):
+    values = np.where(ONE, 3, -1).astype(dtype)
+    with pytest.raises(UserError, match="mask has negative values, such as -1: threshold it first"):
+        as_mask(values)
+    assert np.array_equal(as_mask(values, mask_value=3), ONE)
+
+
+@pytest.mark.parametrize("shape", [(0, 4), (0, 40, 60), (40, 60, 0)])
+def test_no_mask_at_all_is_one_line(shape):
+    with pytest.raises(UserError, match="mask is empty; give an image with pixels"):
+        as_mask(np.zeros(shape))
+
+
+def test_an_alpha_channel_that_varies_is_the_mask(tmp_path, rng):
+    """Whatever the colours of the object are, unless they look like a second mask."""
+    for name, colour in (
+        ("black", np.zeros((40, 60, 3))),
+        (
+            "dark half",
+            np.arange(60)[None, :, None] // 15 * np.array([60, 60, 60]) + np.zeros((40, 1, 1)),
+        ),
+        ("photo", rng.integers(0, 256, (40, 60, 3))),
+        ("white", np.full((40, 60, 3), 255)),
+        ("black and white", np.where(MANY[..., None] == 2, 255, 0) + np.zeros(3)),
+    ):
+        alpha = 255 * (MANY > 0)
+        values = np.dstack([colour, alpha]).astype(np.uint8)
+        path = image(tmp_path / "a.png", values)
+        if name == "black and white":
+            with pytest.raises(UserError, match="alpha channel and its colours are two masks"):
+                read_mask(path)
+        else:
+            assert np.array_equal(read_mask(path), MANY > 0), name
+    opaque = np.dstack([np.repeat(255 * ONE[..., None], 3, axis=2), np.full((40, 60), 255)])
+    assert np.array_equal(read_mask(image(tmp_path / "a.png", opaque.astype(np.uint8))), ONE)

@@ -59,6 +59,11 @@ distortion_coefficients: !!opencv-matrix
    dt: d
    data: [ 0., 0., 0., 0., 0. ]
 """
+OPEN3D = {
+    "height": 480,
+    "width": 640,
+    "intrinsic_matrix": np.reshape(K, (3, 3)).T.ravel().tolist(),
+}
 FILES = {
     "opencv.yml": (OPENCV, SIZED),
     "opencv-nested.yaml": (as_json({"camera_matrix": np.reshape(K, (3, 3)).tolist()}), WANTED),
@@ -75,6 +80,9 @@ FILES = {
     "echo.yaml": (ROS_INFO + "---\n", SIZED),
     "ros1.yml": (ROS_INFO.replace("\nk:", "\nK:").replace("\nd:", "\nD:"), SIZED),
     "calibration.yaml": (yaml.safe_dump(CALIBRATION), SIZED),
+    # Open3D writes a matrix column by column, alone or as the intrinsics of a camera.
+    "open3d.json": (as_json(OPEN3D), SIZED),
+    "open3d_camera.json": (as_json({"extrinsic": [1.0] * 16, "intrinsic": OPEN3D}), SIZED),
     "nested.json": (as_json({"K": np.reshape(K, (3, 3)).tolist()}), WANTED),
     "numbers.txt": (f"fx: {FX}\nfy: {FY}\ncx: {CX}\ncy: {CY}\n", WANTED),
 }
@@ -330,3 +338,67 @@ def test_a_principal_point_off_the_middle_is_doubted():
         (doubt,) = camera.doubts(480, 640)
         assert "640 × 480" in doubt
         assert "cut out" in doubt
+
+
+@pytest.mark.parametrize("order", [(0, 2, 1, 3), (2, 3, 0, 1)])
+@given(
+    f=st.floats(200, 1500),
+    off=st.floats(-0.05, 0.05),
+    size=st.sampled_from([(480, 640), (720, 1280)]),
+)
+def test_numbers_in_another_order_are_named(order, f, off, size):
+    """Both orders are named; numbers that fit as they are stay what they are."""
+    rows, columns = size
+    right = (f, f * 1.02, (0.5 + off) * columns, (0.5 - off) * rows)
+    as_intrinsics(right).check_resolution(rows, columns)
+    wrong = [right[i] for i in order]
+    names = ",".join(["fx", "fy", "cx", "cy"][i] for i in order)
+    if abs(wrong[2] / columns - 0.5) < 0.1 and abs(wrong[3] / rows - 0.5) < 0.1:
+        return
+    with pytest.raises(FrameError, match=f"as fx,fy,cx,cy .* as {names} they do: give") as error:
+        as_intrinsics(wrong).check_resolution(rows, columns)
+    given_ = [float(number) for number in str(error.value).rpartition("give ")[2].split(",")]
+    assert given_ == pytest.approx(right, rel=1e-4)
+
+
+@pytest.mark.parametrize("scale", [0.25, 1 / 3, 0.5, 2 / 3, 1.5, 2.0])
+@given(x=st.floats(-0.09, 0.09), y=st.floats(-0.09, 0.09))
+def test_a_principal_point_near_the_centre_of_a_usual_scale_is_refused(scale, x, y):
+    camera = Intrinsics(600.0, 600.0, scale * (1 + x) * 320 - 0.5, scale * (1 + y) * 240 - 0.5)
+    with pytest.raises(FrameError, match="the centre of an image") as error:
+        camera.check_resolution(480, 640)
+    assert error.value.name == "other-resolution"
+
+
+INFO = {"width": 640, "height": 480, "k": K}
+ROI = {"x_offset": 100, "y_offset": 40, "width": 400, "height": 300, "do_rectify": False}
+
+
+@pytest.mark.parametrize(
+    ("more", "size", "scale", "offset"),
+    [
+        ({}, (480, 640), 1, (0, 0)),
+        ({"binning_x": 0, "binning_y": 1, "roi": dict.fromkeys(ROI, 0)}, (480, 640), 1, (0, 0)),
+        ({"binning_x": 2, "binning_y": 2}, (240, 320), 2, (0, 0)),
+        ({"binning_x": 2, "binning_y": 2}, (480, 640), 1, (0, 0)),
+        ({"roi": ROI}, (300, 400), 1, (100, 40)),
+        ({"roi": ROI}, (480, 640), 1, (0, 0)),
+        ({"roi": ROI, "binning_x": 2, "binning_y": 2}, (150, 200), 2, (100, 40)),
+    ],
+)
+def test_binning_and_roi_count_for_frames_of_their_size(tmp_path, more, size, scale, offset):
+    """A point of the scene is where it was, in pixels that are larger or counted from elsewhere."""
+    (tmp_path / "info.yaml").write_text(as_json(INFO | more))
+    found = camera_of(str(tmp_path / "info.yaml")).intrinsics.of_size(*size)
+    found.check_resolution(*size)
+    x, y = 0.1, -0.05
+    column, row = FX * x + CX - offset[0], FY * y + CY - offset[1]
+    wanted = (column + 0.5) / scale - 0.5, (row + 0.5) / scale - 0.5
+    assert (found.fx * x + found.cx, found.fy * y + found.cy) == pytest.approx(wanted)
+
+
+def test_a_frame_of_neither_size_is_refused(tmp_path):
+    (tmp_path / "info.yaml").write_text(as_json(INFO | {"binning_x": 2, "binning_y": 2}))
+    camera = camera_of(str(tmp_path / "info.yaml")).intrinsics
+    with pytest.raises(FrameError, match="are for 640 × 480 pixels, the frame has 160 × 120"):
+        camera.of_size(120, 160).check_resolution(120, 160)

@@ -109,7 +109,7 @@ def test_a_mask_of_another_size_is_refused(shape):
         object_mask(scene(), REACH, np.ones(shape))
 
 
-@pytest.mark.parametrize("shape", [(ROWS,), (1, 1, ROWS, COLUMNS)])
+@pytest.mark.parametrize("shape", [(ROWS,), (2, 1, ROWS, COLUMNS)])
 def test_a_mask_has_rows_and_columns(shape):
     with pytest.raises(
         UserError, match=f"mask: {len(shape)} axes; a mask has two, rows and columns"
@@ -121,8 +121,9 @@ def test_a_mask_has_rows_and_columns(shape):
 def test_of_several_masks_one_is_given_unless_all_are_alike(axis):
     square = box(SQUARE)
     for n in (1, 3):
-        alike = object_mask(scene(), REACH, np.stack([square] * n, axis=axis))
-        assert np.array_equal(alike, square)
+        alike = np.stack([square] * n, axis=axis)
+        for given_mask in (alike, alike[None]):
+            assert np.array_equal(object_mask(scene(), REACH, given_mask), square)
     instances = np.stack([square, ~square, square], axis=axis)
     with pytest.raises(UserError, match="3 masks of 64 × 48 pixels; which of them"):
         object_mask(scene(), REACH, instances)

@@ -3,6 +3,7 @@
 A new reader is one entry of `READERS`.
 """
 
+import json
 import math
 import shutil
 from collections.abc import Callable, Mapping
@@ -326,6 +327,54 @@ def estimator_problem(estimator: Any) -> str:
     return f"{broken[0]} is not finite" if broken else ""
 
 
+# Masks and cameras
+
+
+def make_mask(path: Path, mode: str = "L") -> None:
+    from PIL import Image
+
+    labels = np.zeros((40, 60), dtype=np.uint8)
+    labels[6:30, 8:30], labels[10:30, 30:50] = 1, 2
+    if path.suffix == ".npy":
+        np.save(path, labels / 2)
+    else:
+        Image.fromarray(labels).convert(mode).save(path)
+
+
+def read_first_label(path: Path) -> Any:
+    from nbv.frames.depth_files import read_mask
+
+    return read_mask(path, 1)
+
+
+def read_any_mask(path: Path) -> Any:
+    from nbv.frames.depth_files import read_mask
+
+    return read_mask(path)
+
+
+def mask_problem(mask: Any) -> str:
+    return "" if mask.dtype == bool and mask.ndim == 2 else f"{mask.dtype} {mask.shape}"
+
+
+def make_camera(path: Path) -> None:
+    roi = {"x_offset": 10, "y_offset": 20, "width": 300, "height": 200}
+    k = [585.0, 0.0, 319.5, 0.0, 585.0, 239.5, 0.0, 0.0, 1.0]
+    info = {"width": 640, "height": 480, "k": k, "binning_x": 2, "binning_y": 2, "roi": roi}
+    path.write_text(yaml.safe_dump(info))
+
+
+def read_camera(path: Path) -> Any:
+    from nbv.frames.intrinsics import camera_of
+
+    return camera_of(str(path))
+
+
+def camera_problem(camera: Any) -> str:
+    found = camera.intrinsics
+    return "" if min(found.fx, found.fy) > 0 and math.isfinite(found.fx * found.fy) else f"{found}"
+
+
 # Settings
 
 
@@ -371,6 +420,14 @@ def make_bop_results(path: Path) -> None:
     write_example(path.parent)
 
 
+def make_bop_models(path: Path) -> None:
+    make_bop_results(path)
+    matrices = [[-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]]
+    axes = [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]
+    entries = [{"symmetries_discrete": matrices}, {"symmetries_continuous": axes}]
+    path.write_text(json.dumps({"1": {"diameter": 100.0, **entries[0], **entries[1]}}))
+
+
 def make_bop_truth(path: Path) -> None:
     make_bop_results(path.parent)
 
@@ -392,6 +449,57 @@ def bop_problem(result: Any) -> str:
     return "" if np.allclose(determinant, 1.0, atol=0.01) else "a matrix is no rotation"
 
 
+STAMPED = """header:
+  frame_id: camera_optical_frame
+pose:
+  position: {x: 0.1, y: 0.0, z: 0.7}
+  orientation:
+    x: 0.0
+    y: 0.6
+    z: 0.0
+    w: 0.8
+---
+"""
+
+
+def make_pose(path: Path) -> None:
+    rotation = [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]
+    pose = np.block([[np.array(rotation), np.array([[0.1, 0.0, 0.7]]).T], [0, 0, 0, 1]])
+    view = {"R": rotation, "t": [100.0, 0.0, 700.0], "score": 0.4, "camera_pose": pose.tolist()}
+    bop = {"cam_R_m2c": np.ravel(rotation).tolist(), "cam_t_m2c": [0, 0, 700.0], "obj_id": 1}
+    turned = {"position": [0, 0, 0.7], "quaternion_wxyz": [0.8, 0, 0.6, 0]}
+    text = {
+        ".json": json.dumps([view, bop, turned, {"pose": pose.tolist(), "score": 1}]),
+        ".yaml": 2 * STAMPED,
+        ".txt": "\n".join(" ".join(map(str, row)) for row in [*pose, *pose]),
+    }
+    if path.suffix in text:
+        path.write_text(text[path.suffix])
+    else:
+        np.save(path, np.stack([pose] * 3))
+
+
+def read_estimates_6d(path: Path) -> Any:
+    from nbv.tables.next_camera import read_views
+
+    return [view.rotation for view in read_views(path)]
+
+
+def read_camera_poses(path: Path) -> Any:
+    from nbv.poses import read_poses
+
+    return [pose[:3, :3] for pose in read_poses(path)]
+
+
+def rotations_problem(rotations: Any) -> str:
+    is_right = rotations and np.allclose(np.linalg.det(np.stack(rotations)), 1.0, atol=0.01)
+    return "" if is_right else "a matrix is no rotation"
+
+
+def of_poses(name: str, read: Callable[[Path], Any] = read_estimates_6d) -> Reader:
+    return Reader(name, make_pose, read, rotations_problem)
+
+
 def make_rotation_table(path: Path) -> None:
     make_bop_results(path.parent / "results.csv")
     read_bop_results(path.parent / "results.csv").save(path)
@@ -405,9 +513,25 @@ def read_rotation_table(path: Path) -> Any:
 
 READERS: Mapping[str, Reader] = {
     "bop results": Reader("results.csv", make_bop_results, read_bop_results, bop_problem),
-    "bop models": Reader("models_info.json", make_bop_results, read_bop_results, bop_problem),
+    "bop models": Reader("models_info.json", make_bop_models, read_bop_results, bop_problem),
     "bop truth": Reader("000001/scene_gt.json", make_bop_truth, read_bop_truth, bop_problem),
     "rotations": Reader("t.npz", make_rotation_table, read_rotation_table, bop_problem),
+    "estimate json": of_poses("e.json"),
+    "estimate yaml": of_poses("e.yaml"),
+    "estimate text": of_poses("e.txt"),
+    "estimate npy": of_poses("e.npy"),
+    "camera yaml": of_poses("c.yaml", read_camera_poses),
+    "camera text": of_poses("c.txt", read_camera_poses),
+    "camera npy": of_poses("c.npy", read_camera_poses),
+    "mask labels": Reader("m.png", make_mask, read_first_label, mask_problem),
+    "mask palette": Reader(
+        "m.png", lambda path: make_mask(path, "P"), read_first_label, mask_problem
+    ),
+    "mask colours": Reader(
+        "m.png", lambda path: make_mask(path, "RGBA"), read_first_label, mask_problem
+    ),
+    "mask array": Reader("m.npy", make_mask, read_any_mask, mask_problem),
+    "camera": Reader("info.yaml", make_camera, read_camera, camera_problem),
     "obj": of_mesh("one.obj", make_mesh),
     "obj by hand": of_mesh("one.obj", make_hand_written_obj),
     "ply ascii": of_mesh("one.ply", lambda path: make_mesh(path, encoding="ascii")),

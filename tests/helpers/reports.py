@@ -64,4 +64,5 @@ def report_files(root: Path, tree: Path, evaluations, drawn) -> dict[str, object
         "figures": figures,
         "table1": tables["table1"].with_suffix(".csv"),
         "runtime": root / "cost.html",
+        "docs": "../../docs",
     }

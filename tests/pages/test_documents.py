@@ -94,7 +94,7 @@ def test_source_files_that_a_document_names_exist(path: Path) -> None:
     assert not [name for name in set(named) if not (ROOT / name).exists()]
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/drivers.md", "docs/five-minutes.md"])
+@pytest.mark.parametrize("name", ["docs/drivers.md", "docs/five-minutes.md"])
 def test_the_python_of_a_document_takes_public_names_alone(name: str) -> None:
     text = (ROOT / name).read_text("utf-8")
     snippets = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)

@@ -19,7 +19,7 @@ PAGE = Path(__file__).parents[2] / "docs/your-estimator.md"
 
 @pytest.fixture(scope="module")
 def snippet(tmp_path_factory) -> str:
-    (text,) = re.findall(r"^```python\n(.*?)^```", PAGE.read_text("utf-8"), re.DOTALL | re.M)
+    text, *_ = re.findall(r"^```python\n(.*?)^```", PAGE.read_text("utf-8"), re.DOTALL | re.M)
     path = tmp_path_factory.mktemp("page") / "snippet.py"
     path.write_text(text, "utf-8")
     return str(path)

@@ -123,6 +123,64 @@ def test_a_table_of_pairs_has_failures_and_no_detections(tmp_path):
         read_orientation_table(tmp_path / "p.csv", least_score=0.1)
 
 
+def test_an_image_without_objects_has_no_partner(scene, tmp_path):
+    rows, truths = scene
+    truths["3"] = []
+    found = read(tmp_path, rows, truths)
+    assert len(found.truth) == 78
+    assert found.left_out == (
+        "2 of 80 estimates are farther than 50 mm from every instance of their object",
+    )
+
+
+def test_truths_may_have_matrices_of_rows(scene, tmp_path):
+    rows, truths = scene
+    plain = read(tmp_path, rows, truths)
+    for entry in truths["3"]:
+        entry["cam_R_m2c"] = np.reshape(entry["cam_R_m2c"], (3, 3)).tolist()
+    assert np.array_equal(read(tmp_path, rows, truths).truth, plain.truth)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("cam_R_m2c", [float("nan")] * 9, "cam_R_m2c is not 9 finite"),
+        ("cam_R_m2c", [1] * 9, "cam_R_m2c is not a rotation"),
+        ("cam_t_m2c", [0, 0, 0.7], "cam_t_m2c is 0.7 mm away"),
+        ("obj_id", 1.7, "obj_id 1.7 is no integer"),
+    ],
+)
+def test_a_fault_of_the_truth_is_named_in_its_file(scene, tmp_path, key, value, message):
+    rows, truths = scene
+    truths["3"][1][key] = value
+    with pytest.raises(UserError, match=rf"scene_gt\.json, image 3, instance 1: {message}"):
+        read(tmp_path, rows, truths)
+    # Faults of images without estimates do no harm.
+    assert len(read(tmp_path, rows[rows["im_id"] != 3], truths).truth) == 78
+
+
+def test_truths_of_one_of_several_cameras_are_named(scene, tmp_path):
+    rows, truths = scene
+    read(tmp_path, rows, truths)
+    file = tmp_path / "000005" / "scene_gt.json"
+    file.rename(file.with_name("scene_gt_cam1.json"))
+    with pytest.raises(UserError, match=r"copy .*000005/scene_gt_cam1\.json there"):
+        read_orientation_table(tmp_path / "results.csv")
+
+
+def test_a_part_of_an_object_is_none(scene, tmp_path):
+    rows, truths = scene
+    with pytest.raises(UserError, match=r"results\.csv, row 5: obj_id 1.7 is no integer"):
+        read(tmp_path, rows.assign(obj_id=np.where(rows.index == 3, 1.7, 1)), truths)
+
+
+def test_objects_without_an_entry_are_named(scene, tmp_path):
+    rows, truths = scene
+    (tmp_path / "m.json").write_text('{"000001": {}, "2": {}}')
+    found = read(tmp_path, rows, truths, models_info=tmp_path / "m.json")
+    assert "m.json has no entry for object 1 (it has 000001, 2)" in found.left_out[0]
+
+
 def test_instances_of_a_static_scene_are_told_apart(scene, tmp_path):
     rows, truths = scene
     assert set(read(tmp_path, rows, truths).group) == {"5/0", "5/1"}

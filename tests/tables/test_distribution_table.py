@@ -381,7 +381,7 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
             "23 columns of probabilities are not p0 to p22: rename 'p23'",
         ),
         (lambda t: t.assign(p3=[*t["p3"][:-1], -0.5]), "row 73, p3: a probability is negative"),
-        (lambda t: t.rename(columns={"p3": "P3"}), "rename 'P3'"),
+        (lambda t: t.rename(columns={"p3": "p_3"}), "rename 'p_3'"),
         (lambda t: pd.concat([t, t[:1]]), "object 'o0' has 2 views at 0°"),
         (lambda t: t[[*t.columns[:7]]], "8 classes or more"),
     ],

@@ -1,4 +1,4 @@
-"""The answer for a symmetric object stays near an earlier pose."""
+"""Which views count, what candidates are, and which of equal poses is the answer."""
 
 from dataclasses import replace
 
@@ -65,3 +65,124 @@ def test_the_command_takes_a_previous_pose(table, tmp_path, monkeypatch, capsys)
     options += ["--camera-pose", "camera.npy"]
     assert main([*options, "--previous", "previous.npy"]) == 2
     assert "--previous and the last estimate" in capsys.readouterr().err
+
+
+# Views
+
+
+def turned(deg, distance_mm=700.0):
+    """A view of an object at the base frame's origin, about whose y axis the camera has turned."""
+    made = np.eye(4)
+    made[:3, :3] = Rotation.from_euler("y", deg, degrees=True).as_matrix()
+    made[:3, 3] = -distance_mm / 1000 * made[:3, 2]
+    return PoseEstimate(made[:3, :3].T, np.array([0, 0, distance_mm]), None, made)
+
+
+@pytest.fixture(scope="module")
+def flipping():
+    """Of an object whose estimates are flipped where it is seen from +x; low scores tell."""
+    truth = Rotation.random(300, random_state=0).as_matrix()
+    flips = truth[:, 2, 0] < -0.3
+    estimate = np.where(flips[:, None, None], truth @ np.diag([-1.0, -1, 1]), truth)
+    score = np.where(flips, 0.3, 0.8) + np.linspace(0, 0.1, 300)
+    group = np.repeat(np.arange(20).astype(str), 15)
+    return OrientationTable(np.full(300, "cup"), group, estimate, truth, score, True)
+
+
+def test_a_view_from_the_same_place_counts_once(flipping):
+    views = [turned(0), turned(100)]
+    wanted = flipping.recommend(views, 20)
+    for again in ([views[0], *views], [views[0], views[1], turned(95), views[1]]):
+        answer = flipping.recommend(again, 20)
+        assert answer.expected_error_deg == pytest.approx(wanted.expected_error_deg)
+        assert np.allclose(answer.rotation, wanted.rotation)
+        (warning,) = set(answer.warnings) - set(wanted.warnings)
+        assert "within 15° of a later one" in warning
+    (rolled,) = {flipping.recommend([turned(0)] * n, 20).expected_error_deg for n in (1, 2, 5)}
+    assert rolled > wanted.expected_error_deg
+
+
+def test_camera_poses_that_contradict_each_other_are_refused(flipping):
+    views = [turned(0), turned(100)]
+    wrong = [replace(view, camera_pose=np.linalg.inv(view.camera_pose)) for view in views]
+    with pytest.raises(UserError, match=r"views 0 and 1 place .* inverted"):
+        flipping.recommend(wrong, 20)
+
+
+def test_a_camera_far_from_the_base_is_told(flipping):
+    far = np.eye(4)
+    for metres in (49.0, 51.0):
+        far[2, 3] = metres
+        answer = flipping.recommend([PoseEstimate(np.eye(3))], 9, camera_pose=far)
+        assert any("millimetres" in text for text in answer.warnings) == (metres > 50)
+
+
+# Candidates
+
+
+def test_candidates_that_look_away_are_left_out_and_counted(flipping):
+    poses = [move.target_camera_pose for move in flipping.recommend([turned(0)], 20).moves]
+    wanted = flipping.recommend([turned(0)], poses)
+    away = poses[0] @ np.diag([1.0, -1, -1, 1])
+    answer = flipping.recommend([turned(0)], [away, *poses, away])
+    assert [m.index - 1 for m in answer.moves] == [m.index for m in wanted.moves]
+    assert [m.expected_error_deg for m in answer.moves] == pytest.approx(
+        [m.expected_error_deg for m in wanted.moves]
+    )
+    (warning,) = set(answer.warnings) - set(wanted.warnings)
+    assert warning.startswith(f"2 of {len(poses) + 2} candidates look away")
+    with pytest.raises(UserError, match="candidate 0: the object is behind this camera"):
+        flipping.recommend([turned(0)], [away, away, poses[0]])
+
+
+@pytest.mark.parametrize("n", [0, -1, 10_001])
+def test_a_sphere_has_a_limit(flipping, n):
+    with pytest.raises(UserError, match=f"`sphere`={n}: give 1 to 10000"):
+        flipping.recommend([turned(0)], n)
+
+
+def test_many_candidates_rank_as_few(flipping):
+    poses = [move.target_camera_pose for move in flipping.recommend([turned(0)], 60).moves]
+    few = flipping.recommend([turned(0)], poses)
+    many = flipping.recommend([turned(0)], poses * 40)
+    assert len(many.moves) == 40 * len(few.moves)
+    one, other = ([m.expected_error_deg for m in each.moves] for each in (few, many))
+    # What the choice among them adds is the same for all.
+    assert np.ptp(np.array(other) - np.repeat(one, 40)) < 1e-6
+
+
+def test_without_a_camera_pose_targets_are_in_the_camera(flipping):
+    view = replace(turned(0), camera_pose=None)
+    for answer, frame in (
+        (flipping.recommend([view], 9), "frame of the present camera"),
+        (flipping.recommend([view], 9, camera_pose=np.eye(4)), "base frame"),
+        (flipping.recommend([turned(0)], 9), "base frame"),
+    ):
+        assert answer.frame == frame
+
+
+# Scores
+
+
+def scored(table, *scores):
+    answer = table.recommend([replace(turned(0), score=score) for score in scores], 9)
+    return answer.expected_error_deg, set(answer.warnings)
+
+
+def test_a_score_of_none_is_no_score(flipping):
+    assert scored(flipping, -1) == scored(flipping, None)
+    assert scored(flipping, 0.4) != scored(flipping, None)
+    none = replace(flipping, score=np.full(300, -1.0))
+    assert scored(none, -1) == scored(none, 0.5) == scored(replace(none, score=None), None)
+    logits = replace(flipping, score=np.log(flipping.score / (1 - flipping.score)))
+    assert scored(logits, -1) != scored(logits, None)
+
+
+@pytest.mark.parametrize(
+    ("unit", "score", "is_odd"),
+    [(1, score, not 0 <= score <= 1) for score in (0.0, 1.0, 1.01, -0.5, 87.0)]
+    + [(100, score, not 0 <= score <= 120) for score in (20.0, 110.0, -5.0, 1000.0)],
+)
+def test_a_score_of_another_scale_is_told(flipping, unit, score, is_odd):
+    _, warnings = scored(replace(flipping, score=unit * flipping.score), score)
+    assert any("another scale" in text for text in warnings) == is_odd

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from nbv.cli import main
 from nbv.errors import UserError
-from nbv.numbers import read_poses
+from nbv.poses import read_pose, read_poses
 from nbv.tables.bop import read_orientation_table
 from nbv.tables.next_camera import PoseEstimate, as_view, read_views
 from nbv.tables.orientation_table import OrientationTable
@@ -350,6 +350,34 @@ def test_the_commands_of_the_page(tmp_path, monkeypatch, capsys):
     assert main([*options, "--candidates", "poses.npy"]) == 0
     assert main(options) == 2
     assert "--candidates and --sphere: give one of them" in capsys.readouterr().err
+
+
+def test_the_next_pose_is_read_back_in_every_form(tmp_path, monkeypatch, capsys):
+    """The commands of the page for a folder of poses, and the other forms."""
+    monkeypatch.chdir(tmp_path)
+    page = (Path(__file__).parents[2] / "docs/your-estimator.md").read_text("utf-8")
+    made, calibrate, command = re.findall(
+        r"^    ((?:python|nbv) .*(?:ob_in|FOLDER).*)$", page, re.M
+    )
+    write_example(made.split()[-1])
+    assert main(calibrate.split()[1:]) == 0
+    *options, _, target = command.split()[1:]
+    options.remove("--format"), options.remove("pose-stamped")
+    capsys.readouterr()
+    assert main([*options, "--json", "--format", "4x4"]) == 0
+    wanted = json.loads(capsys.readouterr().out)["target_camera_pose"]
+    for form, order in (
+        ("pose-stamped", None),
+        ("4x4", None),
+        ("quaternion", "xyzw"),
+        ("quaternion", "wxyz"),
+    ):
+        more = [] if order is None else ["--quaternion", order]
+        assert main([*options, "--format", form, *more]) == 0
+        out = capsys.readouterr().out
+        assert out.startswith("# decision   one more view")
+        Path(target).write_text(out)
+        assert read_pose(target, order).camera_pose == pytest.approx(np.array(wanted), abs=1e-8)
 
 
 def test_the_keys_of_an_azimuth_are_a_subset(tmp_path, monkeypatch, capsys, pairs):

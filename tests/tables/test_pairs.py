@@ -15,6 +15,7 @@ from nbv.core.circle.sweeps import N_VIEWS, WIDEST_GAP_DEG
 from nbv.errors import UserError
 from nbv.experiment.config import load_config
 from nbv.experiment.estimates import write_estimates
+from nbv.labels import counted
 from nbv.tables.pairs import PairTable
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -286,3 +287,14 @@ def test_a_compressed_file_is_read_as_the_file_itself(tmp_path):
         table.to_csv(tmp_path / name, index=False)
     plain, packed = (PairTable.load(tmp_path / name).estimates for name in ("p.csv", "p.csv.gz"))
     assert np.array_equal(plain.estimate_deg, packed.estimate_deg)
+
+
+@pytest.mark.parametrize("strange", [-1, 999])
+@pytest.mark.parametrize("others", [[], [5, 200], [-2], [361], [-170, -10, 20], [0, 360]])
+def test_an_estimate_that_stands_out_and_repeats_is_told(strange, others):
+    rows = pd.DataFrame({"estimate_deg": [strange, strange, *others]})
+    is_alone = all(0 <= other <= 360 or (other < 0) != (strange < 0) for other in others)
+    told = "".join(PairTable(Path("p.csv"), rows).repeated)
+    assert (
+        told.startswith(f"2 of {counted(len(rows), 'estimate')} are exactly {strange}") == is_alone
+    )

@@ -186,11 +186,11 @@ def test_the_public_api_is_described(pages, site):
 def test_a_mistake_in_a_document_stops_the_build(tmp_path):
     mistakes = {
         "[gone](docs/nowhere.md)": "nowhere.md",
-        "[gone](docs/glossary.md#nowhere)": "nowhere",
+        "[gone](docs/data.md#nowhere)": "nowhere",
         "$\\nosuchcommand$": "nosuchcommand",
     }
     project = tmp_path / "project"
-    for name in ("docs/site", "docs/glossary.md", "docs/method.md"):
+    for name in ("docs/site", "docs/data.md", "docs/method.md"):
         (project / name).parent.mkdir(parents=True, exist_ok=True)
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copyfile
         copy(ROOT / name, project / name)

@@ -1,6 +1,7 @@
 """Bundles by the real Snakefile, run small."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ from projects import TINY, Project, finished_project
 
 pytestmark = pytest.mark.slow
 
+ROOT = Path(__file__).parents[2]
+NUMBER = r"\d+(\.\d)?"
 CAMERA = (
     *TINY,
     "categories=[mug]",
@@ -126,6 +129,18 @@ def assert_tested_with_all(
             poses = np.degrees(np.angle(beliefs @ np.exp(1j * np.radians(azimuth_deg)))) % 360
             apart = np.abs(poses - azimuth_deg)
             assert np.minimum(apart, 360 - apart).mean() == pytest.approx(mae_deg, abs=1e-3)
+
+
+def test_a_run_ends_with_the_errors_of_its_bundle_as_the_page_shows_them(made: Project) -> None:
+    (made.results / "bundles/jug.safetensors").unlink()
+    said = made.run("--cores", "2", "bundles", overrides=JUGS).stderr
+    page = (
+        (ROOT / "docs/own-category.md").read_text("utf-8").replace("results/drill", "results/tiny")
+    )
+    (shown,) = re.findall(r"\n\n((?:    .*\n)*    use it: .*\n)", page)
+    lines = re.sub(NUMBER, "#", shown.replace("drill.", "jug.")).replace("\n    ", "\n").strip()
+    assert lines.count("\n") == 6
+    assert lines in re.sub(NUMBER, "#", said)
 
 
 def test_a_folder_of_meshes_becomes_a_bundle_that_answers(

@@ -184,6 +184,21 @@ def reference_of_run(wildcards):
     return str(find_reference(REFERENCES, CONFIG) / "configuration.yaml")
 
 
+def lines_of_bundles():
+    """What is said of the bundles that a run of bundles has made."""
+    from nbv.experiment.statistics.bundle import bundle_lines
+
+    made = paths(
+        f"{PLAN.results}/bundles/{{category}}.safetensors", zip(CONFIG["categories"])
+    )
+    return [
+        line
+        for path in map(Path, made)
+        if path.is_file()
+        for line in bundle_lines(path)
+    ]
+
+
 def banner(*lines):
     line = "-" * 72
     print("\n".join(["", line, *lines, line]), file=sys.stderr, flush=True)
@@ -205,7 +220,12 @@ onsuccess:
     report = f"{PLAN.results}/report.html"
     # A run of some tables alone has none.
     read_first = f"    read first: {report}" if Path(report).is_file() else ""
-    banner("nbv: finished", f"results: {PLAN.results}/{read_first}", *PLAN.caution)
+    banner(
+        "nbv: finished",
+        f"results: {PLAN.results}/{read_first}",
+        *lines_of_bundles(),
+        *PLAN.caution,
+    )
 
 
 onerror:

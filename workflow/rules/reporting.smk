@@ -152,6 +152,7 @@ rule report:
         ENVIRONMENT
     params:
         categories=CONFIG["categories"],
+        docs=os.path.relpath(ROOT / "docs", PLAN.results),
         tables=list(TABLES),
         figures=SHOWN_FIGURES,
         caution=PLAN.caution,

@@ -15,6 +15,7 @@ with job(snakemake):
         provenance=Path(given.provenance),
         table1=Path(given.table1),
         runtime=Path(given.runtime),
+        docs=params.docs,
         caution=params.caution,
         splits=dict(zip(params.categories, map(Path, given.splits), strict=True)),
         tables=dict(zip(params.tables, map(Path, given.tables), strict=True)),

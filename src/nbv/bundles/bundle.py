@@ -180,11 +180,9 @@ class Bundle:
     def load(cls, path: str | Path) -> Bundle:
         """Read a file of `save`.
 
-        Raises
-        ------
-        BundleError
-            ``no-bundle`` where the file is missing or is not a bundle, ``damaged-bundle`` where
-            it was changed or cut short, ``older-bundle`` or ``newer-bundle`` for another format.
+        Raise BundleError ``no-bundle`` where the file is missing or is not a bundle,
+        ``damaged-bundle`` where it was changed or cut short, ``older-bundle`` or ``newer-bundle``
+        for another format.
         """
         path = Path(path)
         if not path.is_file():

@@ -26,7 +26,7 @@ ENOUGH_VIEWS = 24
 PRIOR_SWEEPS = 30.0
 """Number of a camera's sweeps that count as much as all sweeps that a bundle was made with.
 
-One sweep then counts as about twelve of the 352 of `mug`: docs/turntable.md.
+One sweep then counts as about twelve of the 352 of `mug`: docs/own-category.md.
 """
 
 PAPER = "pose_ambiguity"
@@ -122,7 +122,7 @@ def recalibrated(
     Sweeps are used `without_offset`. The focal length of frames without intrinsics is theirs where
     it is known. The OOD threshold rises to theirs, but never falls: a few objects differ less from
     each other than from those of the category that a robot meets next. A sweep of unknown elevation
-    counts for all elevations.
+    counts for all elevations. `origin` is the source of the sweeps, for the provenance.
 
     One sweep or two are too few alone. So the bundle's own calibration sweeps stay, for the
     temperature too, and count together as much as `PRIOR_SWEEPS` of the new ones. Each of them
@@ -131,13 +131,6 @@ def recalibrated(
 
     The paper's table of an elevation is made again if it is the nearest one of a new sweep. It is
     made of all sweeps nearest to it, new ones and the bundle's, each with weight 1.
-
-    Parameters
-    ----------
-    origin : str
-        Source of the sweeps, for the provenance.
-    density : mapping
-        See `paper_tables`.
     """
     n_made_with = bundle.provenance.get("turns_made_with", len(bundle.object_ids))
     sweeps = [without_offset(sweep, bundle.temperature) for sweep in sweeps]

@@ -14,7 +14,7 @@ from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.network import Sweep
 from nbv.bundles.ood import ood_score
 from nbv.choice.next_view import AfterRotations, after_rotations, next_view
-from nbv.choice.rotations import MIN_SEPARATION_DEG
+from nbv.choice.rotations import MIN_SEPARATION_DEG, as_limit_deg
 from nbv.core.alike.compare import CalibrationViews
 from nbv.core.circle.angles import (
     circular_distance_deg,
@@ -42,17 +42,9 @@ _MOST_DRAWS = 100
 
 @dataclass(frozen=True)
 class Predictions:
-    """A bundle's distributions for one recording.
+    """A bundle's calibrated distributions (n, B) for one recording, whose azimuths (n,) are true.
 
-    Attributes
-    ----------
-    object_id, sequence : str
-    azimuth_deg : ndarray (n,)
-        True azimuths, degrees.
-    distributions : ndarray (n, B)
-        Calibrated p(azimuth | image).
-    sweep_weights : ndarray (S,)
-        Weights of the calibration sweeps for the recording's elevation.
+    `sweep_weights` (S,) are those of the calibration sweeps for the recording's elevation.
     """
 
     object_id: str
@@ -244,7 +236,8 @@ def evaluate(
 
     With `until_deg`, also those where one stops as soon as the expected error is not above it, or
     after the largest number of views. `report` is called after each recording with the number of
-    finished ones.
+    finished ones. Raise UserError where a number of views is below 2, or above the number of a
+    recording's frames, or `until_deg` is below 0.
 
     Returns
     -------
@@ -254,13 +247,10 @@ def evaluate(
         all single-view errors of the recording, because a constant error may be the turntable's
         zero. The mean expected error is NaN where the views are not recommended ones; the mean
         number of views is `n_views` unless one stops before.
-
-    Raises
-    ------
-    UserError
-        Where a number of views is below 2, or above the number of a recording's frames.
     """
     numbers = list(dict.fromkeys(n_views))
+    if until_deg is not None:
+        as_limit_deg("until_deg", until_deg)
     if min(numbers) < 2:
         raise UserError(f"{min(numbers)} views: a choice of views needs 2 or more")
     for sweep in sweeps:

@@ -29,23 +29,11 @@ _FATAL = 4
 
 @dataclass(frozen=True)
 class Sweep:
-    """Views of one object all round at one elevation, with the network's logits.
+    """Views of one object all round at one elevation, with the network's logits (n, B).
 
-    Attributes
-    ----------
-    elevation_deg : float
-        NaN where it is unknown.
-    azimuth_deg : ndarray (n,)
-        True azimuths, degrees.
-    logits : ndarray (n, B)
-    codes : ndarray (n, side, side) uint8
-        The crops.
-    focal_px : float
-        Focal length of the camera, pixels; NaN where it is unknown.
-    files : tuple of str
-        The views' files; () where there are none.
-    warnings : tuple of str
-        Likely mistakes in the frames, a sentence each.
+    Azimuths (n,) are true; `codes` (n, side, side) uint8 are the crops. Elevation and focal length
+    (pixels) are NaN where they are unknown, and `files` () where there are none. Warnings name
+    likely mistakes in the frames, a sentence each.
     """
 
     object_id: str
@@ -62,10 +50,7 @@ class Sweep:
 def open_session(model: bytes) -> onnxruntime.InferenceSession:
     """Return an ONNX model ready to run on one CPU core.
 
-    Raises
-    ------
-    BundleError
-        ``damaged-bundle`` where onnxruntime cannot load it.
+    Raise BundleError ``damaged-bundle`` where onnxruntime cannot load it.
     """
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
@@ -119,17 +104,10 @@ def open_network(
 def find_mirror_plane(network: Network, sweeps: Sequence[Sweep]) -> float | None:
     """Return the azimuth of the mirror plane under which the true azimuths are likeliest.
 
-    Parameters
-    ----------
-    sweeps : sequence of Sweep
-        Sweeps of calibration objects, which were not trained on, with the logits of `network`. A
-        view every 15 degrees is enough, because neighbouring views are similar.
-
-    Returns
-    -------
-    float or None
-        Degrees in [0, 180), in steps of half a class; None where `network` alone is more likely
-        than its average with any mirror image. Each is compared at its best temperature.
+    It is in [0, 180) degrees, in steps of half a class; None where `network` alone is more likely
+    than its average with any mirror image. Each is compared at its best temperature. The sweeps are
+    of calibration objects, which were not trained on, with the logits of `network`. A view every 15
+    degrees is enough, because neighbouring views are similar.
     """
     azimuth_deg = np.concatenate([sweep.azimuth_deg for sweep in sweeps])
     plain = np.concatenate([sweep.logits for sweep in sweeps]).astype(np.float64)

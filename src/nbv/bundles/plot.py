@@ -30,19 +30,8 @@ _MOVE_RADIUS, _RIM = 1.14, 1.26
 def draw_recommendation(answer: Recommendation, path: str | Path, category: str = "object") -> None:
     """Draw crops, belief, expected errors and the move into one figure.
 
-    It shows at most the last four frames, and no errors and move if there is no next view.
-
-    Parameters
-    ----------
-    path : path
-        Its suffix selects the format, one of `KINDS`.
-    category : str
-        Name of the object in the titles.
-
-    Raises
-    ------
-    UserError
-        Where the suffix is not one of `KINDS`.
+    It shows at most the last four frames, and no errors and move if there is no next view. The
+    suffix selects the format; raise UserError where it is not one of `KINDS`.
     """
     path = Path(path)
     kind = path.suffix.lower().removeprefix(".")

@@ -26,7 +26,13 @@ from nbv.choice.next_view import (
 from nbv.core.circle.logits import from_logits
 from nbv.errors import BundleError, UserError, check_number, nearest
 from nbv.files import as_path
-from nbv.frames.crop import Crop, check_depth_limits, check_plausible_nearest, crop_frame
+from nbv.frames.crop import (
+    Crop,
+    check_depth_limits,
+    check_plausible_nearest,
+    crop_frame,
+    unit_doubts,
+)
 from nbv.frames.depth_files import to_metres
 from nbv.frames.intrinsics import Intrinsics, as_intrinsics
 from nbv.frames.masks import object_mask
@@ -51,17 +57,15 @@ def shipped_bundles() -> dict[str, Path]:
 def bundle_path(name: str | Path) -> Path:
     """Return the path of a shipped bundle of this name, or of a file.
 
-    Raises
-    ------
-    BundleError
-        ``no-bundle`` where there is neither.
+    Raise BundleError ``no-bundle`` where there is neither.
     """
     shipped = shipped_bundles()
     if str(name) in shipped:
         return shipped[str(name)]
     if not as_path(name).exists():
-        known = nearest(str(name), shipped) if shipped else "this nbv ships no bundle; give a file"
-        raise BundleError("no-bundle", f"{str(name)!r} does not exist; {known}")
+        known = nearest(str(name), shipped) if shipped else "this nbv ships no bundle"
+        own = "give the file of another bundle, or make one (docs/own-category.md)"
+        raise BundleError("no-bundle", f"{str(name)!r} does not exist; {known}; or {own}")
     return Path(name)
 
 
@@ -133,8 +137,16 @@ class Recommender:
         check_depth_limits(near_m, far_m, bundle.diagonal_m)
         if mask is None and far_m is None:
             check_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
-        inside = object_mask(depth, reach_m, mask, near_m, far_m)
-        return crop_frame(depth, inside, known, bundle.camera, bundle.diagonal_m, bundle.extent_m)
+        about = known, bundle.camera, bundle.diagonal_m, bundle.extent_m
+
+        def crop_at(factor: float) -> Crop:
+            inside = object_mask(depth, reach_m / factor, mask, near_m, far_m)
+            scaled = depth if factor == 1 else depth * np.float32(factor)
+            return crop_frame(scaled, inside, *about, is_given=mask is not None)
+
+        found = crop_at(1.0)
+        doubts = unit_doubts(found, crop_at, bundle.diagonal_m, bundle.extent_m)
+        return replace(found, doubts=(*found.doubts, *doubts))
 
     def distributions(self, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
         """Return p(azimuth | image) (n, B) of crops (n, side, side)."""
@@ -143,21 +155,26 @@ class Recommender:
     def lying_warnings(
         self, codes: NDArray[np.uint8], logits: NDArray[np.floating[Any]]
     ) -> tuple[str, ...]:
-        """Return a sentence if crops (n, side, side) with logits (n, B) look rotated by 90°.
+        """Return a sentence if crops (n, side, side) with logits (n, B) look rotated.
 
-        It finds half or more of the views of a mug that are, and at most 3 % of upright ones.
+        Of 230 drawn and real mugs it finds half of those that lie on a side and six of ten that
+        are upside down, and at most 3 % of upright ones.
         """
         mean, deviation = self.bundle.ood.scales[1]
         upright = energy(logits).mean()
         # Most upright frames end here, because a frame takes little longer than its network.
         if upright <= mean:
             return ()
-        rotated = np.concatenate([np.rot90(codes, quarters, axes=(1, 2)) for quarters in (1, 3)])
-        sides = energy(self.network(rotated)).reshape(2, -1).mean(axis=1)
-        if upright - sides.min() <= deviation:
+        rotated = np.concatenate([np.rot90(codes, quarters, axes=(1, 2)) for quarters in (1, 2, 3)])
+        left, half, right = energy(self.network(rotated)).reshape(3, -1).mean(axis=1)
+        side = min(left, right)
+        if upright - min(side, half) <= deviation:
             return ()
+        # Turned by 90°, what is upside down looks more usual too.
+        is_upside_down = half < (side + upright) / 2
+        what, angle_deg = ("be upside down", 180) if is_upside_down else ("lie on its side", 90)
         return (
-            "the object seems to lie on its side in the image: rotate the frame by 90°, with its "
+            f"the object seems to {what} in the image: rotate the frame by {angle_deg}°, with its "
             "intrinsics, so that up is up in the image",
         )
 
@@ -289,6 +306,10 @@ class Recommender:
             )
         logits = self.network(codes)
         score = float(ood_score(self.bundle.ood, codes, logits).max())
+        unusual = (
+            f"frame looks out of distribution (score {score:.1f}, threshold 1): check mask, units "
+            "and category"
+        )
         answer = next_view(
             from_logits(logits, self.bundle.temperature),
             rotations_deg,
@@ -303,22 +324,13 @@ class Recommender:
             answer,
             ood_score=score,
             warnings=(
-                *_ood_warnings(score),
+                *(unusual,) * (score > 1.0),
                 *self.lying_warnings(codes, logits),
                 *_elevation_warnings(self.bundle, elevation_deg),
                 *answer.warnings,
             ),
             crops=tuple(codes),
         )
-
-
-def _ood_warnings(score: float) -> tuple[str, ...]:
-    if score <= 1.0:
-        return ()
-    return (
-        f"frame looks out of distribution (score {score:.1f}, threshold 1): check mask, units "
-        "and category",
-    )
 
 
 def _elevation_warnings(bundle: Bundle, elevation_deg: float | None) -> tuple[str, ...]:
@@ -351,7 +363,7 @@ def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.gene
 
 def _split(values: NDArray[Any]) -> list[NDArray[Any]]:
     """Return the images of a stack (n, rows, columns), or one image with up to 4 channels."""
-    return list(values) if values.ndim == 3 and values.shape[2] > 4 else [values]
+    return list(values) if values.ndim > 2 and values.shape[-1] > 4 else [values]
 
 
 def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[ArrayLike | None]:
@@ -362,12 +374,16 @@ def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[
     if isinstance(mask, list | tuple) and not (mask and np.ndim(mask[0]) == 1):
         masks = list(mask)
     else:
-        masks = list(_split(np.asanyarray(mask)))
-    if len(masks) != n:
-        raise UserError(
-            f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"
-        )
+        masks = _split(np.asanyarray(mask))
+    _check_one_each(masks, n, "mask")
     return masks
+
+
+def _check_one_each(values: Sequence[Any], n: int, noun: str) -> None:
+    if len(values) != n:
+        raise UserError(
+            f"{counted(n, 'frame')} and {counted(len(values), noun)}: give one for each frame"
+        )
 
 
 def _reject_text(name: str, value: Any, what_to_do: str) -> None:
@@ -381,10 +397,7 @@ def _as_names(names: Sequence[str] | None, n: int) -> Sequence[str | None]:
     """Return the name of each of n frames; None for a single frame without a name."""
     if names is None:
         return [None] if n == 1 else [f"frame {i} of {n}" for i in range(1, n + 1)]
-    if len(names) != n:
-        raise UserError(
-            f"{counted(n, 'frame')} and {counted(len(names), 'name')}: give one for each frame"
-        )
+    _check_one_each(names, n, "name")
     return names
 
 
@@ -395,9 +408,5 @@ def _as_cameras(
     if not each or not all(item is None or isinstance(item, Intrinsics) for item in each):
         shared: Any = intrinsics
         return [shared] * n
-    if len(each) != n:
-        raise UserError(
-            f"{counted(n, 'frame')} and {counted(len(each), 'camera')}: give intrinsics for all, "
-            "or for each frame"
-        )
+    _check_one_each(each, n, "camera")
     return each

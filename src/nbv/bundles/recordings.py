@@ -32,16 +32,10 @@ _SIMILARITY = 0.9
 
 @dataclass(frozen=True)
 class Recording:
-    """Frames of one object, taken from one camera height.
+    """Frames of one object, taken from one camera height, and the intrinsics of each.
 
-    Attributes
-    ----------
-    object_id, sequence : str
-    frames : DataFrame
-        ``path, azimuth_deg`` and, where the manifest has them, ``mask, elevation_deg``, in the
-        order of the manifest.
-    intrinsics : tuple of Intrinsics or None
-        One for each frame.
+    The frames have ``path, azimuth_deg`` and, where the manifest has them, ``mask, elevation_deg``,
+    in the order of the manifest.
     """
 
     object_id: str
@@ -65,14 +59,9 @@ class Recording:
 def read_manifest(path: str | Path) -> list[Recording]:
     """Read a manifest: a CSV file with the columns `REQUIRED`, and any of `OPTIONAL`.
 
-    File names are relative to the manifest's folder. Azimuths are degrees, counter-clockwise
-    around the object seen from above.
-
-    Raises
-    ------
-    UserError
-        Where a column or a file is missing, a file occurs twice in a sequence, or a cell holds an
-        invalid value; it names the row.
+    File names are relative to the manifest's folder. Azimuths are degrees, counter-clockwise around
+    the object seen from above. Raise UserError where a column or a file is missing, a file occurs
+    twice in a sequence, or a cell holds an invalid value; it names the row.
     """
     return recordings_of(Path(path), read_rows(Path(path), REQUIRED))
 
@@ -82,10 +71,9 @@ def recordings_of(path: Path, table: pd.DataFrame) -> list[Recording]:
     need_columns(path, table, REQUIRED)
     absent = [name for name in OPTIONAL if name not in table]
     for name in map(str, table):
-        plain = name.strip().lower()
         if name not in (*REQUIRED, *OPTIONAL) and (
-            similar := difflib.get_close_matches(plain, absent, 1, _SIMILARITY)
-            or [known for known in absent if known == f"{plain}_deg"]
+            similar := difflib.get_close_matches(name, absent, 1, _SIMILARITY)
+            or [known for known in absent if known == f"{name}_deg"]
         ):
             raise UserError(
                 f"{path}: a column {name!r}; call it {similar[0]!r} if it is that, or remove it"
@@ -152,24 +140,13 @@ def run_network(
     report: Callable[[str, FrameError], None],
     near_m: float | None = None,
     far_m: float | None = None,
+    mask_value: float | None = None,
 ) -> Sweep:
     """Return the crops and logits of a recording; rejected frames are reported and skipped.
 
-    Parameters
-    ----------
-    intrinsics : str or None
-        Intrinsics of frames without any in the manifest; see `nbv.frames.intrinsics.camera_of`.
-    depth_scale : float or None
-        See `nbv.frames.depth_files.read_depth`.
-    report : callable
-        Takes the file of a rejected frame, and the reason.
-    near_m, far_m : float, optional
-        The object lies between them in every frame, metres.
-
-    Raises
-    ------
-    UserError
-        Where a file cannot be read, or every frame is rejected.
+    `intrinsics` (`nbv.frames.intrinsics.camera_of`) are of frames without any in the manifest. The
+    object lies between `near_m` and `far_m` in every frame. `report` takes the file of a rejected
+    frame, and the reason. Raise UserError where a file cannot be read, or every frame is rejected.
     """
     codes, kept, focal_px = [], [], []
     doubts: list[str] = []
@@ -180,7 +157,7 @@ def run_network(
     ):
         mask, camera = row.get("mask"), camera_of(intrinsics, row["path"])
         known = listed or camera.intrinsics
-        object_mask = read_mask(mask) if isinstance(mask, str) else None
+        object_mask = read_mask(mask, mask_value) if isinstance(mask, str) else None
         try:
             depth_m = read_depth(row["path"], depth_scale, camera.unit_m)
             try:

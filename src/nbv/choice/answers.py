@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, Literal, TypeVar
 
-from nbv.choice.rotations import GUESS, MIN_SEPARATION_DEG
+from nbv.choice.rotations import GUESS, MIN_SEPARATION_DEG, as_limit_deg
 from nbv.errors import UserError
-from nbv.numbers import Pose
+from nbv.poses import Pose
 
 UNKNOWN_DEG = math.nan
 
@@ -93,6 +93,8 @@ class Answer(Generic[AnyMove]):
         unknown.
     no_flips : bool
         Whether calibration shows no flips of the object: enough, unless limits are given.
+    frame_id : str or None
+        The frame of the target camera poses, if a ROS message named it.
     """
 
     STOP_PROBABILITY: ClassVar[float | None] = None
@@ -104,6 +106,12 @@ class Answer(Generic[AnyMove]):
     warnings: tuple[str, ...] = ()
     helps: bool | None = None
     no_flips: bool = False
+    frame_id: str | None = None
+
+    @property
+    def frame(self) -> str:
+        """The frame of the moves' targets."""
+        return "base frame"
 
     @property
     def move(self) -> AnyMove | None:
@@ -135,6 +143,8 @@ class Answer(Generic[AnyMove]):
     ) -> Decision:
         """Return whether the pose is good enough, one more view is worth it, or no view helps.
 
+        Raise UserError where a limit is out of range, or the answer does not know what it is about.
+
         Parameters
         ----------
         until_deg : float, optional
@@ -144,11 +154,6 @@ class Answer(Generic[AnyMove]):
             Without limits it is `STOP_PROBABILITY`, if the class has one.
         within_deg : float, optional
             By default `STOP_WITHIN_DEG`.
-
-        Raises
-        ------
-        UserError
-            Where a limit is out of range, or the answer does not know what it is about.
         """
         if until_probability is None and within_deg is not None:
             raise UserError("`within_deg` is for `until_probability`; give that too")
@@ -162,7 +167,8 @@ class Answer(Generic[AnyMove]):
             return Decision(None, NO_ERROR)
         is_met: dict[str, bool] = {}
         if until_deg is not None:
-            is_met[f"expected error {now_deg:.1f}°"] = now_deg <= until_deg
+            is_enough = now_deg <= as_limit_deg("until_deg", until_deg)
+            is_met[f"expected error {now_deg:.1f}°"] = is_enough
         least = until_probability if has_limits else self.STOP_PROBABILITY
         if self.no_flips and not has_limits:
             is_met["calibration shows no flips"] = True

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.core.circle.angles import is_angle
 from nbv.errors import FrameError, UserError
 from nbv.files import read_numbers
-from nbv.numbers import Pose, as_finite, as_point, as_pose
+from nbv.numbers import as_finite, as_point
+from nbv.poses import Pose, as_pose
 
 ROLL_LIMIT_DEG = 10.0
 """Roll of a camera at which two opposite views have a 50 % larger error."""
@@ -36,17 +37,7 @@ sign.
 def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> Pose:
     """Return the rigid motion (4, 4) that rotates points about an axis (Rodrigues' formula).
 
-    Parameters
-    ----------
-    point, direction : (3,)
-        A point on the axis and its direction, in the base frame.
-    angle_deg : float
-        Counter-clockwise seen from the direction's tip.
-
-    Raises
-    ------
-    UserError
-        Where the axis has no direction, or the angle is not a finite number.
+    Parameters and errors are those of `moved_camera`.
     """
     origin, (x, y, z) = _as_axis(point, direction)
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -203,15 +194,17 @@ def _elevation_and_roll(down: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def roll_warnings(down: ArrayLike) -> tuple[str, ...]:
-    """Return a sentence if a camera is rolled by more than `ROLL_LIMIT_DEG`, else ().
+    """Return a sentence if a camera is rolled by more than `ROLL_LIMIT_DEG`, or looks up, else ().
 
-    Parameters
-    ----------
-    down : (3,)
-        The direction down in the camera's optical frame. Roll is not defined for a camera that
-        points nearly straight down or up, beyond `MOST_ELEVATION_DEG`.
+    `down` (3,) is in the camera's optical frame. Roll is not defined for a camera that points
+    nearly straight down or up, beyond `MOST_ELEVATION_DEG`.
     """
     elevation_deg, roll_deg = _elevation_and_roll(_as_down(down))
+    if elevation_deg < -MOST_ELEVATION_DEG:
+        return (
+            f"gravity: z={np.asarray(down)[2]:g} says that the camera looks straight up; if it is "
+            "that of an accelerometer, which reports the direction up, reverse all three signs",
+        )
     if abs(roll_deg) <= ROLL_LIMIT_DEG or abs(elevation_deg) > MOST_ELEVATION_DEG:
         return ()
     side = "left" if roll_deg > 0 else "right"
@@ -231,18 +224,10 @@ def _as_down(gravity: ArrayLike) -> NDArray[np.float64]:
 def elevation_from_gravity(gravity: ArrayLike) -> float:
     """Return the elevation of a camera that points at the object, degrees.
 
-    The elevation is the arcsine of the forward component of the unit vector that points down.
-
-    Parameters
-    ----------
-    gravity : (3,)
-        The direction down in the camera's optical frame, of any length above 0.
-
-    Raises
-    ------
-    UserError
-        Where it is not three finite numbers, has no length, or points up in the image: then the
-        camera is upside down, or the signs are wrong.
+    Gravity (3,) is the direction down in the camera's optical frame, of any length above 0. The
+    elevation is the arcsine of the forward component of its unit vector. Raise UserError where it
+    is not three finite numbers, has no length, or points up in the image: then the camera is upside
+    down, or the signs are wrong.
     """
     down = _as_down(gravity)
     if down[1] < -UPSIDE_DOWN * math.hypot(*down.tolist()):
@@ -257,17 +242,8 @@ def elevation_from_gravity(gravity: ArrayLike) -> float:
 def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[np.float64]:
     """Return rotations (m,) in degrees, from numbers or from a mask over the circle.
 
-    Parameters
-    ----------
-    values : array-like
-        Rotations in degrees; or (n,) bool, where entry k selects 360 k / n degrees.
-    name : str
-        Name of the rotations in messages.
-
-    Raises
-    ------
-    UserError
-        Where values are neither, one is not an angle, or there are none.
+    Entry k of a mask (n,) selects 360 k / n degrees. Raise UserError where values are neither, one
+    is not an angle, or there are none.
     """
     try:
         given = np.asarray(values)

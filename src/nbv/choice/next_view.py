@@ -15,7 +15,7 @@ from nbv.choice.rotations import (
     GUESS,
     MIN_SEPARATION_DEG,
     as_allowed,
-    as_travel,
+    as_limit_deg,
     at_rotations,
     best_rotations,
     bins_deg,
@@ -192,32 +192,17 @@ def next_view(
     """Return the estimated pose and the next view.
 
     Views are fused by product. The next one has the least expected error, which is the mean error
-    of calibration objects after the same rotations (`nbv.core.alike`), unless it is not
-    surely better than the view farthest from all so far. Choosing the least value makes it too low
-    by the optimism of the choice, which is added. If a recommendation chose the last view, the same
-    holds for the current expected error.
+    of calibration objects after the same rotations (`nbv.core.alike`), unless it is not surely
+    better than the view farthest from all so far. Choosing the least value makes it too low by the
+    optimism of the choice, which is added. If a recommendation chose the last view, the same holds
+    for the current expected error. Raise UserError where limits exclude every further view, or the
+    maximum travel is invalid.
 
-    Parameters
-    ----------
-    distributions : ndarray (n, B)
-        p(azimuth | image) of each view, above 0.
-    rotations_deg : sequence of float
-        Rotation from the first view to each view; the first is 0.
-    calibrated : AfterRotations
-        See `after_rotations`.
-    affinity : mapping
-        ``power`` and ``pseudo_observations``.
-    share : ndarray (S,), optional
-        Weights of the calibration sweeps.
-    allowed_deg, max_travel_deg, followed
-        See `nbv.Recommender.recommend`.
-
-    Raises
-    ------
-    UserError
-        Where limits exclude every further view, or the maximum travel is invalid.
+    `distributions` (n, B) are p(azimuth | image) of each view, above 0, and `rotations_deg` are
+    from the first view; `affinity` has ``power`` and ``pseudo_observations``, and `share` (S,) are
+    the weights of the calibration sweeps. The limits are those of `nbv.Recommender.recommend`.
     """
-    max_travel_deg = as_travel(max_travel_deg)
+    max_travel_deg = as_limit_deg("max_travel_deg", max_travel_deg)
     belief = product_of_views(distributions, rotations_deg)
     n_bins = len(belief)
     width = 360.0 / n_bins
@@ -332,10 +317,7 @@ def as_rotation_list(
 ) -> list[float]:
     """Return the rotations of n views from the first one.
 
-    Raises
-    ------
-    FrameError
-        ``rotations`` where there are not n numbers, or the first is not 0.
+    Raise FrameError ``rotations`` where there are not n numbers, or the first is not 0.
     """
     try:
         given = np.asarray(rotations_deg, dtype=np.float64)

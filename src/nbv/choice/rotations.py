@@ -50,12 +50,12 @@ def as_allowed(allowed_deg: ArrayLike) -> NDArray[np.float64]:
     return np.where(is_within, rotation_deg, signed_deg(wrap_deg(rotation_deg)))
 
 
-def as_travel(max_travel_deg: float) -> float:
-    """Return a maximum travel; raise UserError unless it is 0 or more."""
-    check_number("`max_travel_deg`", max_travel_deg)
-    if not max_travel_deg >= 0:
-        raise UserError(f"`max_travel_deg`={max_travel_deg}: give degrees, 0 or more")
-    return float(max_travel_deg)
+def as_limit_deg(name: str, limit_deg: float) -> float:
+    """Return the limit that a parameter gives; raise UserError unless it is 0 or more."""
+    check_number(f"`{name}`", limit_deg)
+    if not limit_deg >= 0:
+        raise UserError(f"`{name}`={limit_deg}: give degrees, 0 or more")
+    return float(limit_deg)
 
 
 def at_rotations(
@@ -69,22 +69,12 @@ def at_rotations(
 def best_rotations(
     rotation_deg: NDArray[np.float64], cost: NDArray[np.floating], width: float
 ) -> list[tuple[float, float]]:
-    """Return the local minima of the cost, best first.
+    """Return the local minima of the cost as (rotation, cost), best first.
 
-    Parameters
-    ----------
-    rotation_deg : ndarray (m,)
-        In (-180, 180], ordered by their angle in [0, 360).
-    cost : ndarray (m,)
-        Without NaN.
-    width : float
-        Width of a bin, degrees. Rotations farther apart are not neighbours.
-
-    Returns
-    -------
-    list of (rotation, cost)
-        Rotations with no better neighbour. Equal costs are ordered by travel. All are
-        `MIN_SEPARATION_DEG` or more apart; at most `N_ALTERNATIVES` follow the first.
+    The rotations (m,) are in (-180, 180], ordered by their angle in [0, 360); costs (m,) are
+    without NaN. Rotations farther apart than `width`, that of a bin, are not neighbours. Equal
+    costs are ordered by travel. All minima are `MIN_SEPARATION_DEG` or more apart; at most
+    `N_ALTERNATIVES` follow the first.
     """
     is_near = (np.roll(rotation_deg, -1) - rotation_deg) % 360.0 <= width + 1e-9
     better_after = is_near & (np.roll(cost, -1) < cost)
@@ -132,16 +122,13 @@ def ranked_rotations(
     """Return a lookup table's rotations for an estimate and their costs, best first; and warnings.
 
     As in `nbv.LookupTable.recommend`, a rotation travels more than a bin, at most the table's
-    `max_travel_deg`, and the table's cost of travel counts in the order. The limits are those of
+    `max_travel_deg`, and the table's cost of travel counts in the order; here it also travels
+    `MIN_SEPARATION_DEG`, where one that does is admissible. The limits are those of
     `nbv.Recommender.recommend`. Warnings are those of `flat_warnings`, and one where calibration
-    estimates do not follow azimuths.
-
-    Raises
-    ------
-    UserError
-        Where the estimate is not an angle, or no rotation is admissible.
+    estimates do not follow azimuths. Raise UserError where the estimate is not an angle, or no
+    rotation is admissible.
     """
-    max_travel_deg = min(as_travel(max_travel_deg), lookup.max_travel_deg)
+    max_travel_deg = min(as_limit_deg("max_travel_deg", max_travel_deg), lookup.max_travel_deg)
     n_bins = len(lookup.cost)
     width = 360.0 / n_bins
     if not is_angle(estimate_deg):
@@ -155,6 +142,8 @@ def ranked_rotations(
             "no admissible rotation; relax `allowed_deg` or `max_travel_deg`: a rotation is more "
             f"than {width:g}°, and at most the {lookup.max_travel_deg:g}° of the table"
         )
+    is_apart = is_allowed & (travel >= MIN_SEPARATION_DEG)
+    is_allowed = is_apart if is_apart.any() else is_allowed
     rotation_deg = rotation_deg[is_allowed]
     cost = at_rotations(bin_costs, rotation_deg)
     ranked = best_rotations(rotation_deg, cost + lookup.travel_cost * travel[is_allowed], width)

@@ -9,7 +9,7 @@ from dataclasses import asdict, fields, replace
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from nbv.errors import printable
+from nbv.errors import UserError, printable
 from nbv.labels import counted, matrix_lines
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from nbv.choice.answers import Answer
     from nbv.cli.arguments import Placement, StopOptions
     from nbv.core.circle.offset import Offset
+    from nbv.poses import Pose
 
 AnyAnswer = TypeVar("AnyAnswer", bound="Answer[Any]")
 
@@ -25,9 +26,9 @@ N_ALTERNATIVES = 5
 """Number of other moves in a line of text; JSON has all."""
 
 
-def print_line(line: str) -> None:
-    """Print a line; what a file says, such as a bundle's category, is escaped."""
-    print(printable(line))  # noqa: T201
+def print_line(line: str, start: str = "") -> None:
+    """Print a line after its start; what a file says, such as a category, is escaped."""
+    print(start + printable(line))  # noqa: T201
 
 
 def print_json(value: Any) -> None:
@@ -35,10 +36,10 @@ def print_json(value: Any) -> None:
     print(json.dumps(value, indent=2))  # noqa: T201
 
 
-def print_assumed_camera(focal_px: float, n_frames: int | None = None) -> None:
+def print_assumed_camera(focal_px: float, n_frames: int | None = None, start: str = "") -> None:
     """Print the assumed focal length, and the number of frames if it is given."""
     frames = "" if n_frames is None else f" for {counted(n_frames, 'frame')}"
-    print_line(f"camera     not given{frames}: a focal length of {focal_px:g} px is assumed")
+    print_line(f"camera     not given{frames}: a focal length of {focal_px:g} px is assumed", start)
 
 
 def with_targets(
@@ -55,18 +56,20 @@ def with_targets(
 
     if placement is None:
         return answer
-    warnings = check_axis(*placement, object_position_m, diagonal_m)
+    pose, point, direction, frame_id = placement
+    warnings = check_axis(pose, point, direction, object_position_m, diagonal_m)
     moves: Any = tuple(
-        replace(move, target_camera_pose=moved_camera(*placement, move.rotation_deg))
+        replace(move, target_camera_pose=moved_camera(pose, point, direction, move.rotation_deg))
         for move in answer.moves
     )
-    return replace(answer, moves=moves, warnings=(*answer.warnings, *warnings))
+    warnings = (*answer.warnings, *warnings)
+    return replace(answer, moves=moves, warnings=warnings, frame_id=frame_id)
 
 
-def print_warnings(warnings: Iterable[str]) -> None:
+def print_warnings(warnings: Iterable[str], start: str = "") -> None:
     """Print one line for each warning."""
     for warning in warnings:
-        print_line(f"warning: {warning}")
+        print_line(f"warning: {warning}", start)
 
 
 _KEYS = (
@@ -102,21 +105,36 @@ def show_answer(
     has_targets: bool,
     seen: str = "object",
     assumed_focal_px: float | None = None,
+    form: str | None = None,
+    order: str = "xyzw",
 ) -> None:
     """Print an answer about an object, which is called `seen`, as text or as JSON.
 
-    JSON has keys for the camera's pose after each move if the answer `has_targets`.
+    JSON has keys for the camera's pose after each move if the answer `has_targets`. With another
+    `form` the answer is a comment above the next camera pose, whose quaternion has that order.
     """
     decision = answer.decide(stop.until, stop.until_probability, stop.within)
-    if as_json:
+    if as_json or form == "json":
         enough = None if stop.until is None else answer.expected_error_deg <= stop.until
         about = _as_json(answer, enough, assumed_focal_px, has_targets)
         print_json(about | {"decision": asdict(decision)})
         return
-    print_line(f"decision   {decision.verdict or 'none'}: {decision.reason}")
+    target = None if answer.move is None else answer.move.target_camera_pose
+    if form is not None and target is None:
+        raise UserError(
+            f"--format={form}: the next camera pose is not known: give estimates with a "
+            "position, or --candidates; for frames and azimuths --camera-pose and --axis"
+        )
+    start = "" if form is None else "# "
+    print_line(f"decision   {decision.verdict or 'none'}: {decision.reason}", start)
     if assumed_focal_px is not None:
-        print_assumed_camera(assumed_focal_px)
-    _print_answer(answer, seen)
+        print_assumed_camera(assumed_focal_px, start=start)
+    _print_answer(answer, seen, start)
+    if target is not None:
+        frame = answer.frame if answer.frame_id is None else f"frame {answer.frame_id}"
+        print_line(f"target camera pose in the {frame}", start)
+        for line in _pose_lines(target, form, order, answer.frame_id):
+            print_line(line)
 
 
 def _as_json(
@@ -151,23 +169,48 @@ def _value(value: Any) -> Any:
     return None if is_unknown else value
 
 
-def _print_answer(answer: Answer[Any], seen: str) -> None:
+def _pose_lines(pose: Pose, form: str | None, order: str, frame_id: str | None) -> list[str]:
+    """Return the lines of a camera's pose as a matrix, position and quaternion, or PoseStamped."""
+    if form is None:
+        return matrix_lines(pose)
+    if form == "4x4":
+        return [_row(row) for row in pose]
+    import numpy as np
+    import yaml
+    from scipy.spatial.transform import Rotation
+
+    position, quaternion = pose[:3, 3], Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True)
+    if form == "quaternion":
+        quaternion = quaternion if order == "xyzw" else np.roll(quaternion, 1)
+        return [f"# x y z (metres), quaternion {order}", _row([*position, *quaternion])]
+    message = {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": frame_id or ""},
+        "pose": {
+            "position": dict(zip("xyz", position.tolist(), strict=True)),
+            "orientation": dict(zip("xyzw", quaternion.tolist(), strict=True)),
+        },
+    }
+    return list(yaml.safe_dump(message, sort_keys=False).splitlines())
+
+
+def _row(numbers: Iterable[float]) -> str:
+    return " ".join(f"{number + 0.0:.9g}" for number in numbers)
+
+
+def _print_answer(answer: Answer[Any], seen: str, start: str) -> None:
     for head, line in zip_longest(["pose"], answer.pose_lines(seen), fillvalue=""):
-        print_line(f"{head:<10} {line}")
+        print_line(f"{head:<10} {line}", start)
     if (move := answer.move) is None:
-        print_line("next view  none")
+        print_line("next view  none", start)
     else:
-        print_line(f"next view  {move.instruction} ({move.extent}): {answer.value(move)}")
+        move_line = f"next view  {move.instruction} ({move.extent}): {answer.value(move)}"
+        print_line(move_line, start)
     if others := answer.alternatives[:N_ALTERNATIVES]:
         listed = (f"{other.name} ({answer.short_value(other)})" for other in others)
         first, *errors = (each.expected_error_deg for each in answer.moves)
         why = "; lower ones are not lower by more than their noise" if first > min(errors) else ""
-        print_line(f"or         {', '.join(listed)}{why}")
-    print_warnings(answer.warnings)
-    if move is not None and move.target_camera_pose is not None:
-        print_line("target camera pose in the base frame")
-        for line in matrix_lines(move.target_camera_pose):
-            print_line(line)
+        print_line(f"or         {', '.join(listed)}{why}", start)
+    print_warnings(answer.warnings, start)
 
 
 def print_offset(name: str, number: str, offset: Offset, *, is_added: bool = False) -> None:

@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from cyclopts import Parameter, Token
 
@@ -70,12 +70,22 @@ Numbers = Annotated[list[float] | None, _list_parameter(as_numbers, "NUMBER...")
 FileAxis = Annotated[str, Parameter(allow_leading_hyphen=True)]
 WholeNumbers = Annotated[list[int] | None, _list_parameter(as_numbers, "NUMBER...")]
 WholeNumber = Annotated[int, Parameter(converter=as_whole_number, n_tokens=1, metavar="INT")]
-Estimate = Annotated[list[float] | Path, _list_parameter(as_rotations_or_file, "NUMBER...|FILE")]
+_NUMBERS_OR_FILE = _list_parameter(as_rotations_or_file, "NUMBER...|FILE")
+Estimate = Annotated[list[float] | Path, _NUMBERS_OR_FILE]
+PoseSource = Annotated[list[float] | Path | None, _NUMBERS_OR_FILE]
 Rotations = Annotated[
     list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FROM:TO|FILE")
 ]
 
 Json = Annotated[bool, Parameter(negative=(), help="Print JSON.")]
+Format = Annotated[
+    Literal["4x4", "quaternion", "pose-stamped", "json"] | None,
+    Parameter(
+        name="--format",
+        help="Print the next camera pose in this form, and the answer as comments above it; json "
+        "is --json, which wins over the others.",
+    ),
+]
 BundleName = Annotated[str, Parameter(help="The name of a shipped bundle, or a file.")]
 Followed = Annotated[
     bool,
@@ -123,8 +133,8 @@ def as_paragraphs(command: Command) -> Command:
     return command
 
 
-Placement = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
-"""Camera pose in the base frame, point on the object's axis, and direction of the axis."""
+Placement = tuple["NDArray[np.float64]", "list[float]", "list[float]", "str | None"]
+"""Camera pose, point on the object's axis, direction of the axis, and name of the base frame."""
 
 
 @as_paragraphs
@@ -145,12 +155,15 @@ class FrameOptions:
         Least depth of the object, metres.
     far
         Largest depth of the object, metres.
+    mask_value
+        The object's value in masks that are images of labels.
     """
 
     intrinsics: str | None = None
     depth_scale: float | None = None
     near: float | None = None
     far: float | None = None
+    mask_value: float | None = None
 
 
 @as_paragraphs
@@ -169,16 +182,19 @@ class MoveOptions:
     camera_pose
         The camera's pose at the last view, for which the target pose is printed too: the pose of
         the optical frame (x right, y down, z forward) in the base frame, metres; the 16 numbers of
-        a 4 x 4 matrix, row by row, in a .txt, .npy or .json file.
+        a 4 x 4 matrix, row by row, or a .txt, .npy, .json or .yaml file with it or a PoseStamped.
     axis
-        The object's upright axis in the base frame: a point, metres, or a point and a direction.
-        Default direction: 0 0 1.
+        The object's upright axis in the base frame: a point, metres, or a point and a direction, or
+        a file with the object's pose, whose z axis it is. Default direction: 0 0 1.
+    quaternion
+        The order of the quaternion, xyzw or wxyz, in poses of 7 numbers: x y z, metres, and it.
     """
 
     allowed: Rotations = None
     max_travel: float = 180.0
-    camera_pose: Path | None = None
-    axis: Numbers = None
+    camera_pose: PoseSource = None
+    axis: PoseSource = None
+    quaternion: Literal["xyzw", "wxyz"] | None = None
 
     def allowed_deg(self) -> Any:
         """Return the rotations of ``--allowed``, read from a file if it names one."""
@@ -189,22 +205,24 @@ class MoveOptions:
     def placement(self) -> Placement | None:
         """Return where camera and object are, if both are given.
 
-        Raises
-        ------
-        UserError
-            If only one is given, or is not a pose or an axis.
+        Raise UserError if only one is given, or is not a pose or an axis.
         """
         if self.camera_pose is None and self.axis is None:
             return None
         if self.camera_pose is None or self.axis is None:
             raise UserError("--camera-pose and --axis belong together; give both, or neither")
+        from nbv.poses import read_pose
+
+        camera = read_pose(self.camera_pose, self.quaternion)
+        if isinstance(self.axis, Path):
+            pose = read_pose(self.axis, self.quaternion).camera_pose
+            return camera.camera_pose, pose[:3, 3].tolist(), pose[:3, 2].tolist(), camera.frame_id
         if len(self.axis) not in (3, 6):
             raise UserError(
                 f"--axis has {len(self.axis)} numbers; give a point, or a point and a direction"
             )
-        from nbv.numbers import read_pose
-
-        return read_pose(self.camera_pose), self.axis[:3], self.axis[3:] or [0.0, 0.0, 1.0]
+        direction = self.axis[3:] or [0.0, 0.0, 1.0]
+        return camera.camera_pose, self.axis[:3], direction, camera.frame_id
 
 
 @as_paragraphs
@@ -236,6 +254,7 @@ NUMBER_OPTIONS = (
     "--rotations",
     "--allowed",
     "--axis",
+    "--camera-pose",
     "--gravity",
     "--views",
     "--intrinsics",
@@ -283,13 +302,8 @@ def check_options(given: Mapping[str, object], known: Sequence[str], of_what: st
 def check_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:
     """Check that the file of an option can be written, before anything is computed.
 
-    Missing folders are made later. Without `kinds`, all suffixes are allowed.
-
-    Raises
-    ------
-    UserError
-        Where the suffix is not allowed, the path is a folder, or its parent is a file or is not
-        writable.
+    Missing folders are made later. Without `kinds`, all suffixes are allowed. Raise UserError where
+    the suffix is not allowed, the path is a folder, or its parent is a file or is not writable.
     """
     if kinds and path.suffix.lower() not in kinds:
         raise UserError(f"{option}={path}: give a name that ends in {' or '.join(kinds)}")

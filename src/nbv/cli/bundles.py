@@ -87,7 +87,8 @@ def render(
     write_depth(output, frame.depth_m)
     camera, n_pixels = frame.intrinsics, int(frame.mask.sum())
     if json:
-        about = {"file": str(output), "intrinsics": asdict(camera), "object_pixels": n_pixels}
+        known = {name: value for name, value in asdict(camera).items() if value is not None}
+        about = {"file": str(output), "intrinsics": known, "object_pixels": n_pixels}
         print_json(about)
         return
     print_line(

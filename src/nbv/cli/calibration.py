@@ -6,6 +6,7 @@ import logging
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,6 +34,7 @@ from nbv.cli.arguments import (
     check_writable,
     in_flags,
 )
+from nbv.errors import by_number
 from nbv.labels import counted
 
 if TYPE_CHECKING:
@@ -65,14 +67,16 @@ class CalibrationOptions:
         expected_dispersion, bayes_error, expected_error or fixed.
     ground_truth
         The truth of BOP's results: the folder that has the scenes' scene_gt.json, or a CSV file in
-        the form of results. Default: the folder of the results.
+        the form of results. Default: the folder of the results. The truth of a folder of poses: a
+        folder of poses with the same names.
     models_info
         For orientations: BOP's models_info.json, which gives the objects' symmetries.
     object
         Keep this object of a file of orientations; give the option again for more. Default: all.
+        For a folder of poses: the object's name. Default: the folder's name.
     nearest
-        An estimate of BOP that is farther from every instance of its object, millimetres, is left
-        out. Default: 50.
+        An estimate of BOP, or of a folder, that is farther from every instance of its object,
+        millimetres, is left out. Default: 50.
     least_score
         Leave out estimates of lower scores.
     bundle
@@ -104,8 +108,9 @@ def calibrate(
     a table for nbv next. With columns p0, p1, ..., the probabilities of the
     azimuths 360 k / B, the table also serves distributions. From orientations,
     BOP's results or pairs (object_id, R_true, R_estimate), it makes a table for
-    camera poses. From a manifest of frames (object_id, sequence, file,
-    azimuth_deg) it makes a bundle for your camera.
+    camera poses, and so it does from a folder with an estimated pose per frame,
+    whose truths are in the folder --ground-truth. From a manifest of frames
+    (object_id, sequence, file, azimuth_deg) it makes a bundle for your camera.
 
     Example: nbv calibrate pairs.csv --output table.npz
 
@@ -114,13 +119,13 @@ def calibrate(
     Parameters
     ----------
     source
-        A CSV file of pairs or of frames.
+        A CSV file of pairs or of frames, or a folder of poses.
     output
         The file to write: .npz for a table, .safetensors for a bundle.
     """
     from nbv.files import read_rows
 
-    rows = read_rows(source, ())
+    rows = None if source.is_dir() else read_rows(source, ())
     kind = _kind(rows)
     given = vars(options) | {"camera": None} | vars(options.camera)
     check_options(given, OPTIONS[kind], f"{source}, which holds {kind}")
@@ -128,9 +133,9 @@ def calibrate(
     CALIBRATIONS[kind](source, rows, output, options, json)
 
 
-def _kind(rows: pd.DataFrame) -> str:
-    """Return what a file with the columns of these rows holds."""
-    if "R_true" in rows or ("obj_id" in rows and "R" in rows):
+def _kind(rows: pd.DataFrame | None) -> str:
+    """Return what a file with the columns of these rows holds, or a folder, which has none."""
+    if rows is None or "R_true" in rows or ("obj_id" in rows and "R" in rows):
         return ORIENTATIONS
     return FRAMES if "file" in rows and "estimate_deg" not in rows else AZIMUTHS
 
@@ -254,6 +259,7 @@ def _calibrate_table(
     pairs = PairTable.from_rows(source, rows)
     sweeps = pairs.distributions
     views, thin = (pairs.estimates, ()) if sweeps else pairs.thin_estimates
+    thin = (*pairs.repeated, *thin)
     estimates = views.estimate_deg
     table = DistributionTable.from_pairs(sweeps) if sweeps else None
     lookup = LookupTable.of(chosen_lookup(estimates, criterion, DENSITY))
@@ -281,20 +287,21 @@ def _calibrate_table(
 
 
 def _calibrate_orientations(
-    source: Path, rows: pd.DataFrame, output: Path, options: CalibrationOptions, as_json: bool
+    source: Path, rows: Any, output: Path, options: CalibrationOptions, as_json: bool
 ) -> None:
     """Make the table of estimates in three dimensions."""
     from nbv.tables.bop import read_orientation_table
+    from nbv.tables.pose_folders import read_pose_folders
     from nbv.tables.walks import NO_FORECAST, forecast
 
     truth = options.ground_truth, options.models_info, options.object or []
-    limits = options.nearest, options.least_score
-    pairs = read_orientation_table(source, *truth, *limits, rows=rows)
+    read = read_pose_folders if rows is None else partial(read_orientation_table, rows=rows)
+    pairs = read(source, *truth, options.nearest, options.least_score)
     about = pairs.about()
     pairs.save(output)
     if not as_json:
         print_warnings(pairs.left_out)
-        for summary in about:
+        for summary in sorted(about, key=lambda summary: by_number(summary.object_id)):
             depends = "flips depend" if summary.depends_on_view else "no evidence that flips depend"
             print_line(
                 f"object {summary.object_id}: {counted(summary.n_pairs, 'pair')} "
@@ -369,7 +376,8 @@ def _run_on_recordings(
         print(line, file=sys.stderr) if as_json else print_line(line)  # noqa: T201
 
     recommender = Recommender.load(bundle)
-    options = camera.intrinsics, camera.depth_scale, report, camera.near, camera.far
+    limits = camera.near, camera.far, camera.mask_value
+    options = camera.intrinsics, camera.depth_scale, report, *limits
     sweeps = [run_network(recommender, recording, *options) for recording in recordings]
     for sweep in sweeps:
         for warning in sweep.warnings:

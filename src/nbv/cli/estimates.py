@@ -15,6 +15,7 @@ from nbv.cli.arguments import (
     ORIENTATIONS,
     Estimate,
     Followed,
+    Format,
     Json,
     MoveOptions,
     Numbers,
@@ -30,13 +31,16 @@ if TYPE_CHECKING:
 KINDS = {AZIMUTHS: "cost", DISTRIBUTIONS: "distribution.of_views", ORIENTATIONS: "truth"}
 """What a table may hold, and the name of an array by which it is known."""
 
+N_NUMBERS = {AZIMUTHS: (1,), DISTRIBUTIONS: (None,), ORIENTATIONS: (7, 9, 16, None)}
+"""How many numbers --estimate may have; None for a file."""
+
 ESTIMATES = {
     AZIMUTHS: "one number of degrees",
     DISTRIBUTIONS: "a .csv or .npy file with a row of probabilities for each view",
-    ORIENTATIONS: "9 numbers, or a .json or .npy file",
+    ORIENTATIONS: "a pose: 9 or 16 numbers, 7 with --quaternion, or a file",
 }
 
-_FOR_ALL = ("max_travel", "camera_pose", "until")
+_FOR_ALL = ("max_travel", "camera_pose", "quaternion", "until")
 _PROBABLE = ("until_probability", "within")
 _ROUND_AXIS = (*_FOR_ALL, "allowed", "axis")
 OPTIONS = {
@@ -58,7 +62,7 @@ class CandidateOptions:
     object
         The object, where a table of orientations has several.
     candidates
-        Camera poses that can be reached, for a table of orientations: 16 numbers each, like
+        Camera poses that can be reached, for a table of orientations: a file of several, like
         --camera-pose.
     sphere
         Instead of --candidates: the number of camera poses, spaced evenly around the object.
@@ -85,6 +89,7 @@ def next_view(
     limits: MoveOptions = MoveOptions(),
     around: CandidateOptions = CandidateOptions(),
     stop: StopOptions = StopOptions(),
+    form: Format = None,
     json: Json = False,
 ) -> None:
     """Recommend the next view after estimates of your own estimator.
@@ -103,8 +108,8 @@ def next_view(
         The file that nbv calibrate made for the estimator.
     estimate
         An azimuth, degrees; a file with distributions, one row for each view: CSV with columns p0,
-        p1, ..., or .npy; or the 9 numbers of a rotation matrix, object to camera, or a .json or
-        .npy file with several hypotheses or views.
+        p1, ..., or .npy; or a pose, object to camera: a 3 x 3 or 4 x 4 matrix, 9 or 16 numbers row
+        by row, or a .txt, .npy, .json or .yaml file with one or with several hypotheses or views.
     rotations
         Rotation of each view from the first one: 0 90, or 0,90, for two distributions.
     """
@@ -125,7 +130,14 @@ def next_view(
         else:
             answer = _recommended(table, estimate, limits, rotations or [0.0], followed)
         answer, has_targets = with_targets(answer, placement), placement is not None
-    show_answer(answer, stop, as_json=json, has_targets=has_targets)
+    show_answer(
+        answer,
+        stop,
+        as_json=json,
+        has_targets=has_targets,
+        form=form,
+        order=limits.quaternion or "xyzw",
+    )
 
 
 def _kind(table: Path, estimate: list[float] | Path) -> str:
@@ -141,7 +153,7 @@ def _kind(table: Path, estimate: list[float] | Path) -> str:
         raise UserError(f"{table} is not a table; {remedy}")
     kind = kinds[0] if isinstance(estimate, list) else kinds[-1]
     n_numbers = len(estimate) if isinstance(estimate, list) else None
-    if n_numbers not in {AZIMUTHS: (1,), DISTRIBUTIONS: (None,), ORIENTATIONS: (9, None)}[kind]:
+    if n_numbers not in N_NUMBERS[kind]:
         raise UserError(f"--estimate: {table} holds {kind}; give {ESTIMATES[kind]}")
     return kind
 
@@ -170,17 +182,18 @@ def _ranked_cameras(
 ) -> Answer[Any]:
     if (around.candidates is None) == (around.sphere is None):
         raise UserError("--candidates and --sphere: give one of them")
-    from nbv.numbers import read_pose, read_poses
-    from nbv.tables.next_camera import as_view, read_views
+    from nbv.poses import read_pose, read_poses
+    from nbv.tables.next_camera import read_views
     from nbv.tables.orientation_table import OrientationTable
 
+    order, camera = limits.quaternion, limits.camera_pose
     answer = OrientationTable.load(table).recommend(
-        read_views(estimate) if isinstance(estimate, Path) else [as_view(estimate, "--estimate")],
-        read_poses(around.candidates) if around.candidates is not None else around.sphere or 0,
+        read_views(estimate, order),
+        around.sphere or 0 if around.candidates is None else read_poses(around.candidates, order),
         object_id=around.object,
-        camera_pose=None if limits.camera_pose is None else read_pose(limits.camera_pose),
+        camera_pose=None if camera is None else read_pose(camera, order),
         max_travel_deg=limits.max_travel,
-        previous=None if around.previous is None else read_views(around.previous)[-1],
+        previous=None if around.previous is None else read_views(around.previous, order)[-1],
     )
     if (stop.until, stop.until_probability) == (None, None):
         return answer

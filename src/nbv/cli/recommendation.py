@@ -14,6 +14,7 @@ from nbv.cli.arguments import (
     SHIPPED,
     BundleName,
     Followed,
+    Format,
     FrameOptions,
     Json,
     MoveOptions,
@@ -41,6 +42,7 @@ def recommend(
     followed: Followed = True,
     stop: StopOptions = StopOptions(),
     plot: Path | None = None,
+    form: Format = None,
     json: Json = False,
 ) -> None:
     """Estimate the object's azimuth from depth frames and recommend the next view.
@@ -72,6 +74,8 @@ def recommend(
     if not frames:
         hint = "; give frames before --mask" if mask is not None else ""
         raise UserError(f"give a depth frame{hint}; nbv next takes estimates")
+    if camera.mask_value is not None and mask is None:
+        raise UserError("--mask-value goes with --mask; give the masks too, or leave it out")
     if plot is not None:
         check_writable("--plot", plot, IMAGE_SUFFIXES)
     placement = limits.placement()
@@ -95,7 +99,7 @@ def recommend(
             for path, known in zip(frames, cameras, strict=True)
         ],
         rotations_deg=rotations if rotations is not None else [0.0],
-        mask=None if mask is None else [read_mask(path) for path in mask],
+        mask=None if mask is None else [read_mask(path, camera.mask_value) for path in mask],
         intrinsics=[known.intrinsics for known in cameras],
         near_m=camera.near,
         far_m=camera.far,
@@ -122,5 +126,7 @@ def recommend(
         as_json=json,
         has_targets=placement is not None,
         seen=used.category,
+        form=form,
+        order=limits.quaternion or "xyzw",
         assumed_focal_px=used.focal_px if camera.intrinsics is None else None,
     )

@@ -40,10 +40,7 @@ def write_estimates(path: str | Path, estimates: Estimates) -> None:
 def read_estimates(path: str | Path) -> Estimates:
     """Read a file of `write_estimates`; additional columns are ignored.
 
-    Raises
-    ------
-    UserError
-        Where columns or views are missing, or an estimate is not in [0, 360).
+    Raise UserError where columns or views are missing, or an estimate is not in [0, 360).
     """
     frame = read_csv(path)
     check_columns(path, frame, COLUMNS)
@@ -56,11 +53,8 @@ def read_estimates(path: str | Path) -> Estimates:
 def sweep_objects(path: str | Path, frame: pd.DataFrame, azimuth_column: str) -> tuple[str, ...]:
     """Return the objects of a table with one row for every view of a full sweep.
 
-    Raises
-    ------
-    UserError
-        Where the rows are not one object after the other, or the azimuths of an object are not
-        0, 360 / n_views, ….
+    Raise UserError where the rows are not one object after the other, or the azimuths of an object
+    are not 0, 360 / n_views, ….
     """
     object_ids = tuple(frame["object_id"].drop_duplicates())
     n_views, odd = divmod(len(frame), len(object_ids))
@@ -101,10 +95,8 @@ def write_posteriors(path: str | Path, posteriors: Posteriors) -> None:
 def read_posteriors(path: str | Path, object_ids: Sequence[str]) -> Posteriors:
     """Read a file of `write_posteriors`.
 
-    Raises
-    ------
-    UserError
-        Where the file is damaged, or its objects or their order differ from those given.
+    Raise UserError where the file is damaged, or its objects or their order differ from those
+    given.
     """
     stored = read_arrays(path, ("object_ids", "log_posterior", "temperature"))
     names = tuple(str(name) for name in stored["object_ids"])

@@ -18,21 +18,11 @@ def take_fold(
 ) -> FoldEstimates:
     """Return the estimates of another program for a fold's calibration and test objects.
 
-    Parameters
-    ----------
-    estimates : Estimates
-        The estimates for all objects.
-    sweeps : Sweeps
-        The distributions for the same objects; empty if the program gives none. Calibration objects
-        choose one temperature.
-    splits : DataFrame
-        From `nbv.experiment.splits.read_splits`.
+    Raise UserError where the objects differ from those in the splits, or the azimuths do not allow
+    evenly spaced views (`nbv.core.circle.sweeps.evenly_apart`).
 
-    Raises
-    ------
-    UserError
-        Where the objects differ from those in the splits, or the azimuths do not allow evenly
-        spaced views (`nbv.core.circle.sweeps.evenly_apart`).
+    The estimates are of all objects, and so are the distributions, which are empty if the program
+    gives none. Calibration objects choose one temperature.
     """
     check_objects(splits, estimates.object_ids)
     names = {role: objects_with_role(splits, fold, role) for role in ("calibration", "test")}

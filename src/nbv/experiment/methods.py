@@ -29,10 +29,8 @@ def selectable(extensions: Methods) -> list[str]:
 def check_methods(methods: Methods, extensions: Methods, gives_distributions: bool) -> None:
     """Check a configuration's methods of the paper and its extensions, a policy and a fusion each.
 
-    Raises
-    ------
-    UserError
-        If a policy or a fusion is unknown or not possible, or an extension's name is taken.
+    Raise UserError if a policy or a fusion is unknown or not possible, or an extension's name is
+    taken.
     """
     for name, method in methods.items():
         key = f"methods.{name}"

@@ -163,7 +163,12 @@ class Plan:
     def caution(self) -> tuple[str, ...]:
         """What has to be said wherever there are numbers; see `too_small`."""
         epochs = None if self.external else self.config["estimator"].get("epochs")
-        return too_small({name: len(ids) for name, ids in self.objects.items()}, epochs)
+        what = (
+            "differences between its methods"
+            if self.config["experiment"] == "bundles"
+            else "its numbers"
+        )
+        return too_small({name: len(ids) for name, ids in self.objects.items()}, epochs, what)
 
     # Trainings
 
@@ -177,10 +182,7 @@ class Plan:
     def stage(self, stage: Stage) -> dict[str, Any]:
         """Return the settings of a stage. Cross-fitting trains each estimator in fewer epochs.
 
-        Raises
-        ------
-        UserError
-            Where the estimator is not trained.
+        Raise UserError where the estimator is not trained.
         """
         if self.linear:
             kind = self.config["estimator"]["kind"]
@@ -397,8 +399,10 @@ def paths(pattern: str, keys: Iterable[Sequence[Any]]) -> list[str]:
     return filled
 
 
-def too_small(n_objects: Mapping[str, int], epochs: int | None) -> tuple[str, ...]:
-    """Return a sentence that says why a run's numbers mean nothing; none where it is large enough.
+def too_small(
+    n_objects: Mapping[str, int], epochs: int | None, what: str = "its numbers"
+) -> tuple[str, ...]:
+    """Return a sentence that says why a run is too small; none where it is large enough.
 
     `n_objects` is by category; `epochs` is None for estimates of another program.
     """
@@ -412,4 +416,4 @@ def too_small(n_objects: Mapping[str, int], epochs: int | None) -> tuple[str, ..
         reasons.append(f"{epochs} epoch{s} of training, and {FEWEST_EPOCHS} are the least")
     if not reasons:
         return ()
-    return (f"This run is too small for its numbers to mean anything: {'; '.join(reasons)}.",)
+    return (f"This run is too small for {what} to mean anything: {'; '.join(reasons)}.",)

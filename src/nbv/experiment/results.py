@@ -38,23 +38,11 @@ def evaluate_method(
     evidence: Evidence | None = None,
     posteriors: Posteriors | None = None,
 ) -> pd.DataFrame:
-    """Evaluate one method on every view of every test object.
+    """Evaluate one method, a ``policy`` and a ``fusion``, on every view of every test object.
 
-    Parameters
-    ----------
-    method : mapping
-        ``policy`` and ``fusion``; see `nbv.core.circle.policies.two_views`.
-    test : Estimates
-        360 / n_views must be a whole number of degrees.
-    rng, lookup, evidence : optional
-        Inputs of the policy or the fusion; see `nbv.core.circle.policies.HeldOutViews`.
-    posteriors : Posteriors, optional
-        The distributions of the test objects, where the fusion needs them.
-
-    Returns
-    -------
-    DataFrame
-        Columns `COLUMNS`; ``delta_deg`` and ``next_estimate_deg`` are absent for ``none``.
+    Views of `test` are a whole number of degrees apart. The optional inputs are those of
+    `nbv.core.circle.policies.HeldOutViews`. Columns are `COLUMNS`; ``delta_deg`` and
+    ``next_estimate_deg`` are absent for the policy ``none``.
     """
     distributions = None if posteriors is None else posteriors.distributions
     views = HeldOutViews(test.estimate_deg, evidence, rng, lookup, distributions)
@@ -90,6 +78,9 @@ ESTIMATED_ROLES = ("calibration", "test")
 def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.DataFrame]:
     """Read the errors of methods by unit.
 
+    Raise UserError where a file is missing or damaged, where the methods of a fold were evaluated
+    on different objects, or where two folds test the same object.
+
     Returns
     -------
     dict of (category, elevation_deg) to pandas.DataFrame
@@ -97,12 +88,6 @@ def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.Data
         `COLUMNS`, with one row for each method, test object and initial viewpoint.
         Methods come in the order of their first file, which is the order of the categories of
         ``method`` as well.
-
-    Raises
-    ------
-    UserError
-        Where a file is missing or damaged, where the methods of a fold were evaluated on different
-        objects, or where two folds test the same object.
     """
     parts: dict[Unit, dict[str, list[pd.DataFrame]]] = {}
     for (category, elevation_deg, fold, method), path in files.items():

@@ -10,6 +10,8 @@ camera at the same position that points at the object.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +32,12 @@ CROPPED_DEG = 25.0
 
 NEAREST, FARTHEST = 1.5, 20.0
 """Plausible distances, diagonals."""
+
+FAR_UNITS = 5.0
+"""Ratio of units of depth whose objects differ in size by more than those of a category."""
+
+# Difference of the logarithms of two sizes to the usual one.
+_MORE_USUAL = 0.2
 
 _Axis = tuple[float, float, float]
 
@@ -88,45 +96,35 @@ def crop_frame(
     camera: Camera,
     diagonal_m: float,
     extent_m: tuple[float, float] = (0.0, math.inf),
+    *,
+    is_given: bool = False,
 ) -> Crop:
     """Return the crop of one object.
 
-    Parameters
-    ----------
-    depth_m : (rows, columns) float32
-        Metres.
-    mask : (rows, columns) bool
-        See `nbv.frames.masks.object_mask`.
-    intrinsics : Intrinsics
-    camera : Camera
-        The camera of the training images.
-    diagonal_m : float
-        Diagonal of the bounding box of a typical object of the category, metres.
-    extent_m : (float, float)
-        Plausible range of the object's extent in the image, metres.
+    Raise FrameError ``empty-mask``, ``mask-at-border``, ``other-resolution``,
+    ``implausible-distance`` or ``implausible-size``.
 
-    Raises
-    ------
-    FrameError
-        ``empty-mask``, ``mask-at-border``, ``other-resolution``, ``implausible-distance`` or
-        ``implausible-size``.
+    The mask is that of `nbv.frames.masks.object_mask`, and the camera that of the training images.
+    `diagonal_m` is of the bounding box of a typical object of the category, and `extent_m` the
+    plausible range of its extent in the image. Messages doubt first a mask that `is_given`, and was
+    not found in the frame.
     """
     rows, columns = depth_m.shape
+    published, intrinsics = intrinsics, intrinsics.of_size(rows, columns)
     intrinsics.check_resolution(rows, columns)
     window_rows, window_columns = window = window_of(mask)
     if not window_rows.stop:
         raise FrameError("empty-mask", "the mask has no pixel")
-    top, bottom = window_rows.start, window_rows.stop - 1
-    left, right = window_columns.start, window_columns.stop - 1
-    _check_inside(top, bottom, left, right, (rows, columns), intrinsics)
-    middle = (left + right + 1) / 2, (top + bottom + 1) / 2
-    axes, principal = _facing(intrinsics, *middle)
+    _check_inside(window, mask, intrinsics, is_given)
+    top, bottom = window_rows.start, window_rows.stop
+    left, right = window_columns.start, window_columns.stop
+    axes, principal = _facing(intrinsics, (left + right) / 2, (top + bottom) / 2)
     towards = axes[2]
     distance_m = float(np.median(depth_m[window][mask[window]])) / towards[2]
-    width_m = (right - left + 1) * distance_m / intrinsics.fx
-    height_m = (bottom - top + 1) * distance_m / intrinsics.fy
+    width_m = (right - left) * distance_m / intrinsics.fx
+    height_m = (bottom - top) * distance_m / intrinsics.fy
     extent = math.hypot(width_m, height_m)
-    _check_plausible(distance_m, extent, diagonal_m, extent_m)
+    _check_plausible(distance_m, extent, diagonal_m, extent_m, is_given)
     # A pixel covers the same length at the object's centre as in training.
     away_m = distance_m + BEHIND_SURFACE * diagonal_m
     step = pixel_step(camera) * diagonal_m / away_m
@@ -148,7 +146,7 @@ def crop_frame(
     right_m, down_m, ahead_m = (away_m * part for part in towards)
     centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
     doubts = (
-        *intrinsics.doubts(rows, columns),
+        *(intrinsics.doubts(rows, columns) if intrinsics is published else ()),
         *_size_doubts(extent, extent_m),
         *_border_doubts(codes),
     )
@@ -163,6 +161,33 @@ def _size_doubts(extent: float, extent_m: tuple[float, float]) -> tuple[str, ...
     return (
         f"the object would be {extent:.2g} m across in the image; {least:.2g} to {most:.2g} m are "
         "usual: check the unit of depth, the intrinsics and the mask",
+    )
+
+
+def unit_doubts(
+    found: Crop,
+    crop_at: Callable[[float], Crop],
+    diagonal_m: float,
+    extent_m: tuple[float, float],
+) -> tuple[str, ...]:
+    """Return a sentence if the object has a more usual size with depths in a far other unit.
+
+    `crop_at` returns the crop where depths are larger by a factor, or raises FrameError.
+    """
+    sizes_m = {1.0: found.extent_m}
+    for factor in _FACTORS:
+        is_far = not 1 / FAR_UNITS < factor < FAR_UNITS
+        if is_far and _is_near(factor * found.distance_m, diagonal_m):
+            with suppress(FrameError):
+                sizes_m[factor] = crop_at(factor).extent_m
+    usual_m = math.sqrt(extent_m[0] * extent_m[1])
+    unusual = {factor: abs(math.log(size_m / usual_m)) for factor, size_m in sizes_m.items()}
+    factor = min(unusual, key=unusual.__getitem__)
+    if unusual[1.0] - unusual[factor] < _MORE_USUAL:
+        return ()
+    return (
+        f"the object is {found.extent_m:.2g} m across in the image; with depths {factor:.4g} times "
+        f"as large it would be {sizes_m[factor]:.2g} m, which is more usual: check their unit",
     )
 
 
@@ -229,11 +254,8 @@ def _facing(
 def check_depth_limits(near_m: float | None, far_m: float | None, diagonal_m: float) -> None:
     """Check that the depth limits of an object with a diagonal are metres.
 
-    Raises
-    ------
-    UserError
-        Where a limit is negative or not a number, excludes all plausible distances, or is too
-        large to exclude anything.
+    Raise UserError where a limit is negative or not a number, excludes all plausible distances, or
+    is too large to exclude anything.
     """
     limits = (("`near_m`", near_m, FARTHEST), ("`far_m`", far_m, _NO_LIMIT))
     for name, limit_m, most in limits:
@@ -255,12 +277,8 @@ def check_plausible_nearest(
 
     In another unit `reach_m` would cut the object to pieces or include everything behind it, and
     the mask would not reveal the mistake. The other parameters are those of
-    `nbv.frames.masks.object_mask`, and the diagonal of the object's bounding box.
-
-    Raises
-    ------
-    FrameError
-        ``implausible-distance``.
+    `nbv.frames.masks.object_mask`, and the diagonal of the object's bounding box. Raise FrameError
+    ``implausible-distance``.
     """
     measured = depth_m[depth_m > (near_m or 0.0)]
     if not measured.size:
@@ -284,40 +302,52 @@ def _implausible_distance(distance_m: float, diagonal_m: float, factors: list[fl
     )
 
 
-def _help(factors: list[float]) -> str:
+def _help(factors: list[float], is_given: bool = False) -> str:
     if not factors:
         return (
             "mask only the object; check the intrinsics, their resolution, and the object's "
             "category and size"
         )
     listed = " or ".join(f"{float(f'{factor:.4g}'):g}" for factor in factors)
+    first = "does the mask hold the object alone? if it does, " if is_given else ""
     return (
-        f"depths {listed} times as large would fit: look up the camera's unit, and multiply depths "
-        "or `depth_scale` by its factor"
+        f"{first}depths {listed} times as large would fit: look up the camera's unit, and multiply "
+        "depths or `depth_scale` by its factor"
     )
 
 
 def _check_inside(
-    top: int, bottom: int, left: int, right: int, shape: tuple[int, ...], intrinsics: Intrinsics
+    window: tuple[slice, slice], mask: Mask, intrinsics: Intrinsics, is_given: bool
 ) -> None:
-    rows, columns = shape
-    if top > 0 and left > 0 and bottom < rows - 1 and right < columns - 1:
+    (rows, columns), (height, width) = window, mask.shape
+    sides = {"top": rows.start == 0, "bottom": rows.stop == height}
+    sides |= {"left": columns.start == 0, "right": columns.stop == width}
+    cut = " and ".join(name for name, is_cut in sides.items() if is_cut)
+    view = math.degrees(2 * math.atan(max(width / intrinsics.fx, height / intrinsics.fy) / 2))
+    if not cut or view < CROPPED_DEG:
         return
-    view = math.degrees(2 * math.atan(max(columns / intrinsics.fx, rows / intrinsics.fy) / 2))
-    sides = {"top": top == 0, "bottom": bottom == rows - 1}
-    sides |= {"left": left == 0, "right": right == columns - 1}
-    if view >= CROPPED_DEG and (cut := [name for name, is_cut in sides.items() if is_cut]):
+    touches = f"touches the {cut} border of the frame"
+    if is_given:
+        share = np.count_nonzero(mask) / mask.size
         raise FrameError(
             "mask-at-border",
-            f"the object touches the {' and '.join(cut)} border of the frame: it is cut off, or "
-            "what is behind it is taken for it, as for an object below "
-            f"{100 * NEAREST_SHARE:.0f} % of the frame; move the camera, give `far_m`, or mask "
-            "only the object",
+            f"the mask {touches} and covers {100 * share:.0f} % of it: mask only the object, or "
+            "move the camera if it is cut off",
         )
+    raise FrameError(
+        "mask-at-border",
+        f"the object {touches}: it is cut off, or what is behind it is taken for it, as for an "
+        f"object below {100 * NEAREST_SHARE:.0f} % of the frame; move the camera, give `far_m`, or "
+        "mask only the object",
+    )
 
 
 def _check_plausible(
-    distance_m: float, extent: float, diagonal_m: float, extent_m: tuple[float, float]
+    distance_m: float,
+    extent: float,
+    diagonal_m: float,
+    extent_m: tuple[float, float],
+    is_given: bool,
 ) -> None:
     def is_plausible(unit: float) -> bool:
         is_sized = extent_m[0] <= unit * extent <= extent_m[1]
@@ -331,5 +361,5 @@ def _check_plausible(
     raise FrameError(
         "implausible-size",
         f"the object would be {extent:.3g} m across in the image; {extent_m[0]:.2g} to "
-        f"{extent_m[1]:.2g} m are plausible; {_help(factors)}",
+        f"{extent_m[1]:.2g} m are plausible; {_help(factors, is_given)}",
     )

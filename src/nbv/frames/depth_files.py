@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
 
 from nbv.errors import FrameError, UserError, reason_of
 from nbv.files import as_path, missing, replacing
@@ -30,6 +31,10 @@ _NUMBERS = "biuf"
 _LARGEST_16_BIT = 65535
 # Renderers write 1e10 where there is no surface.
 _NO_DEPTH = 1e9
+# A label fills a square of this side, pixels, and labels this share of the mask. Soft edges are
+# narrower, and take less.
+_REGION = 5
+_LABELLED = 0.75
 # Kind, columns, rows and the largest value, possibly with comments between them.
 _PGM_HEADER = re.compile(rb"P[25]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)")
 
@@ -75,10 +80,7 @@ def read_depth(
 def write_depth(path: Path, depth_m: DepthImage) -> None:
     """Write a depth image: ``.png`` of 16 bits in millimetres, or ``.npy`` in metres.
 
-    Raises
-    ------
-    UserError
-        Where a depth exceeds 16 bits.
+    Raise UserError where a depth exceeds 16 bits.
     """
     if path.suffix.lower() != ".png":
         # An open file, because numpy appends .npy to a name in capitals.
@@ -94,54 +96,112 @@ def write_depth(path: Path, depth_m: DepthImage) -> None:
         Image.fromarray(millimetres.astype(np.uint16)).save(temporary)
 
 
-def read_mask(path: str | Path) -> NDArray[np.bool_]:
-    """Read a mask (rows, columns): true where the file is not 0.
+def read_mask(path: str | Path, mask_value: float | None = None) -> NDArray[np.bool_]:
+    """Read the mask (rows, columns) of one object; see `as_mask` for `mask_value` and errors.
 
-    From several arrays in an ``.npz`` it reads ``mask``. Transparent pixels of an image are false.
-
-    Raises
-    ------
-    UserError
-        Where the file cannot be read, is not an image of numbers, or holds several masks.
+    From several arrays in an ``.npz`` it reads ``mask``. An alpha channel that varies is the mask.
+    A value of a palette is an index, and a colour is 65536 R + 256 G + B.
     """
     values = _read_array(as_path(path), "mask")
-    if values.dtype.kind not in _NUMBERS:
-        raise UserError(f"{path} holds {values.dtype}; give a mask of numbers")
-    mask = is_in_mask(values)
-    if mask.ndim == 3 and as_path(path).suffix.lower() in IMAGES:
-        has_opacity = mask.shape[2] in (2, 4)
-        colours = mask[:, :, :-1] if has_opacity else mask
-        mask = np.asarray(colours.any(axis=2) & (mask[:, :, -1] if has_opacity else True))
-    return single_mask(mask, str(path))
+    if values.ndim == 3 and as_path(path).suffix.lower() in IMAGES:
+        values = _labels_of_colours(values, str(path), mask_value)
+    return as_mask(values, str(path), mask_value)
 
 
-def single_mask(mask: NDArray[np.bool_], name: str) -> NDArray[np.bool_]:
-    """Return a mask (rows, columns), also from (rows, columns, n) or (n, rows, columns).
+def as_mask(
+    mask: ArrayLike, name: str = "mask", mask_value: float | None = None
+) -> NDArray[np.bool_]:
+    """Return the mask (rows, columns) of one object.
 
-    Raises
-    ------
-    UserError
-        Where the array has other axes, or the n masks differ.
+    Raise UserError where values are negative or no numbers, masks differ, several values each fill
+    a region, or none is `mask_value`.
+
+    Parameters
+    ----------
+    mask : (rows, columns), (n, rows, columns) or (rows, columns, n)
+        Not 0, or above a half where all are fractions, at the object's pixels; there neither NaN
+        nor masked itself. The n masks are alike.
+    name : str
+        Used in messages.
+    mask_value : float, optional
+        The object's value in an image of labels.
     """
-    if mask.ndim == 3:
-        layers = mask if len(mask) < mask.shape[2] else np.moveaxis(mask, 2, 0)
-        if (layers != layers[0]).any():
-            raise UserError(
-                f"{name}: {len(layers)} masks of {layers.shape[2]} × {layers.shape[1]} pixels; "
-                "which of them? give the object's alone, such as masks[0] or masks[:, :, 0]"
-            )
-        mask = layers[0]
-    if mask.ndim != 2:
-        raise UserError(f"{name}: {mask.ndim} axes; a mask has two, rows and columns")
-    return mask
-
-
-def is_in_mask(mask: ArrayLike) -> NDArray[np.bool_]:
-    """Return where a mask is neither 0 nor NaN nor masked itself."""
-    values = np.asarray(np.ma.filled(mask, 0))
+    values = without_single_axes(np.asarray(np.ma.filled(mask, 0)))
+    if values.dtype.kind not in _NUMBERS:
+        raise UserError(f"{name} holds {values.dtype}; give a mask of numbers")
+    if values.ndim not in (2, 3):
+        raise UserError(f"{name}: {values.ndim} axes; a mask has two, rows and columns")
     if values.dtype.kind == "f":
-        return np.asarray((values != 0) & ~np.isnan(values))
-    return values if values.dtype == np.bool_ else np.asarray(values != 0)
+        values = np.where(np.isnan(values), 0, values)
+    if not values.size:
+        raise UserError(f"{name} is empty; give an image with pixels")
+    layers = values[None] if values.ndim == 2 else values
+    if values.ndim == 3 and len(values) >= values.shape[2]:
+        layers = np.moveaxis(values, 2, 0)
+    least, most = layers.min(initial=0), layers.max(initial=0)
+    is_fraction = layers.dtype.kind == "f" and most <= 1
+    inside = layers > 0.5 if is_fraction else layers != 0
+    if mask_value is not None:
+        inside = layers == mask_value
+    elif least < 0:
+        raise UserError(
+            f"{name} has negative values, such as {least:g}: threshold it first, as in mask > 0"
+        )
+    if (inside != inside[0]).any():
+        raise UserError(
+            f"{name}: {len(layers)} masks of {layers.shape[2]} × {layers.shape[1]} pixels; which "
+            "of them? give the object's alone, such as masks[0] or masks[:, :, 0]"
+        )
+    if mask_value is None and most > 1:
+        _check_one_label(layers[0], inside[0], name)
+    elif mask_value is not None and not inside.any():
+        raise UserError(
+            f"`mask_value`={mask_value:.9g}: no pixel of {name} has it; it has {least:.9g} to "
+            f"{most:.9g}"
+        )
+    return np.asarray(inside[0])
+
+
+def without_single_axes(values: NDArray[Any]) -> NDArray[Any]:
+    """Return an image without the axes of length 1 of its batch and its channel."""
+    while values.ndim > 2 and values.shape[0] == 1:
+        values = values[0]
+    return values[..., 0] if values.ndim == 3 and values.shape[2] == 1 else values
+
+
+def _check_one_label(values: NDArray[Any], inside: NDArray[np.bool_], name: str) -> None:
+    """Raise UserError if several values each fill a region, as labels do and soft edges do not."""
+    shown = values[inside]
+    if not shown.size or shown.min() == shown.max():
+        return
+    is_even = ndimage.minimum_filter(values, _REGION) == ndimage.maximum_filter(values, _REGION)
+    labels = np.unique(values[inside & is_even])
+    if len(labels) < 2 or np.isin(shown, labels).mean() < _LABELLED:
+        return
+    listed = [f"{label:.9g} ({np.count_nonzero(shown == label)} pixels)" for label in labels[:4]]
+    raise UserError(
+        f"{name}: which value is the object? {', '.join(listed)}{' …' * (len(labels) > 4)}: give "
+        f"the object's alone (mask == {labels[0]:.9g}), or `mask_value`"
+    )
+
+
+def _labels_of_colours(
+    values: NDArray[Any], name: str, mask_value: float | None
+) -> NDArray[np.integer[Any]]:
+    """Return labels (rows, columns) of an image with 2 to 4 channels, 0 where it is transparent."""
+    has_opacity = values.shape[2] in (2, 4)
+    opacity = values[..., -1] if has_opacity else np.ones(values.shape[:2])
+    colours = (values[..., :-1] if has_opacity else values).astype(np.int32)
+    is_grey = (colours == colours[..., :1]).all()
+    labels = np.where(opacity > 0, colours[..., 0] if is_grey else colours @ (65536, 256, 1), 0)
+    if mask_value is not None or np.ptp(opacity) == 0:
+        return labels
+    if np.unique(labels[opacity > 0]).tolist() in ([0, 1], [0, 255]):
+        raise UserError(
+            f"{name}: its alpha channel and its colours are two masks: which is the object's? save "
+            "that one as a grey image"
+        )
+    return (opacity > 0).astype(np.int32)
 
 
 def to_metres(
@@ -155,11 +215,9 @@ def to_metres(
     Masked pixels of a masked array were not measured. An image in metres is returned unchanged.
     Same parameters and errors as `read_depth`; `name` is used in messages.
     """
-    values = np.asarray(np.ma.filled(values, 0))
+    values = without_single_axes(np.asarray(np.ma.filled(values, 0)))
     if values.dtype.kind not in "iuf":
         raise UserError(f"{name} holds {values.dtype}; give numbers")
-    if values.ndim == 3 and values.shape[2] == 1:
-        values = values[:, :, 0]
     if values.ndim != 2:
         is_colour = values.ndim == 3 and values.shape[2] <= _MOST_CHANNELS
         what = "a colour image" if is_colour else f"an array of shape {values.shape}"
@@ -214,7 +272,7 @@ def _read_array(path: Path, name: str) -> NDArray[Any]:
     try:
         if not path.is_file():
             raise UserError(f"{path} {missing(path)}")
-        values = _read_image(path) if suffix in IMAGES else _read_numpy(path, name)
+        values = _read_image(path, name) if suffix in IMAGES else _read_numpy(path, name)
     except UserError:
         raise
     # A reader may raise any exception on arbitrary bytes.
@@ -237,7 +295,7 @@ def _read_numpy(path: Path, name: str) -> NDArray[Any]:
         return np.asarray(stored[name if name in stored.files else stored.files[0]])
 
 
-def _read_image(path: Path) -> NDArray[Any]:
+def _read_image(path: Path, name: str) -> NDArray[Any]:
     from PIL import Image  # here, because reading an array does not need it
 
     with Image.open(path) as image:
@@ -249,8 +307,13 @@ def _read_image(path: Path) -> NDArray[Any]:
                 f"{path}: {image.width} × {image.height} pixels; give at most {_MOST_PIXELS}"
             )
         # The numbers of a palette image are indices of colours, one of which may be transparent.
-        colours = "RGBA" if "transparency" in image.info else "RGB"
-        values = np.asarray(image.convert(colours) if image.mode == "P" else image)
+        if image.mode == "P":
+            values = np.asarray(image.convert("RGBA" if "transparency" in image.info else "RGB"))
+            index, is_shown = np.asarray(image), np.asarray(values[..., :3].any(axis=2))
+            if name != "mask" or values.shape[2] == 4 or is_shown[index == 0].any():
+                return values
+            return np.where(is_shown, index, 0)
+        values = np.asarray(image)
         if image.format == "PPM" and image.mode == "I":
             return _as_stored(values, path)
         return values

@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,14 @@ _DISTORTION = re.compile(
     r"d|[kp]\d|cam_d|coeffs|dist(ortion)?(_?(coeffs?|coefficients?|params|parameters))?", re.I
 )
 
+# Scales of images to others, and how far a principal point may be off the centre of such an image.
+_SCALES = (0.25, 1 / 3, 0.5, 2 / 3, 1.5, 2.0, 3.0, 4.0)
+_USUAL_SCALE = 0.1
+
+# Of numbers in the right order, how far the principal point is off the centre, as a share of the
+# side, and the relative difference of the focal lengths.
+_CENTRAL, _SQUARE = 0.1, 0.1
+
 _LEAST_SCALE = 0.2
 """Below it a principal point is near a corner and cannot be the centre of a scaled image."""
 
@@ -43,6 +51,8 @@ class Intrinsics:
         None: the centre of the object, as if the camera pointed at it.
     width, height : int, optional
         Size of the images that they belong to, if known.
+    reduced : Intrinsics, optional
+        Those of images of another size that are binned or cut out of these (ROS: `binning`, `roi`).
 
     Examples
     --------
@@ -62,29 +72,31 @@ class Intrinsics:
     cy: float | None = None
     width: int | None = None
     height: int | None = None
+    reduced: Intrinsics | None = None
 
     def __post_init__(self) -> None:
         for name in ("fx", "fy", "cx", "cy", "width", "height"):
-            if (value := getattr(self, name)) is not None or name in ("fx", "fy"):
-                check_number(f"intrinsics: {name}", value)
-        for name in ("fx", "fy"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise UserError(f"intrinsics: {name}={value:g} must be above 0 (pixels)")
-        for name in ("cx", "cy"):
-            value = getattr(self, name)
-            if value is not None and not math.isfinite(value):
+            if value is None and name not in ("fx", "fy"):
+                continue
+            check_number(f"intrinsics: {name}", value)
+            if name in ("cx", "cy") and not math.isfinite(value):
                 raise UserError(f"intrinsics: {name}={value:g} is not a number")
-        if (self.cx is None) != (self.cy is None):
-            known, missing = ("cy", "cx") if self.cx is None else ("cx", "cy")
-            raise UserError(f"intrinsics: {known} without {missing}; give both, or neither")
-        for name in ("width", "height"):
-            value = getattr(self, name)
-            if value is not None and not value > 0:
+            if name in ("fx", "fy") and not (math.isfinite(value) and value > 0):
+                raise UserError(f"intrinsics: {name}={value:g} must be above 0 (pixels)")
+            if name in ("width", "height") and not value > 0:
                 raise UserError(
                     f"intrinsics: {name}={value:g} must be above 0 (pixels); give the size of the "
                     "depth image, or leave out width and height"
                 )
+        if (self.cx is None) != (self.cy is None):
+            known, missing = ("cy", "cx") if self.cx is None else ("cx", "cy")
+            raise UserError(f"intrinsics: {known} without {missing}; give both, or neither")
+
+    def of_size(self, rows: int, columns: int) -> Intrinsics:
+        """Return the reduced intrinsics if they are those of images of a size, else these."""
+        reduced = self.reduced or self
+        return reduced if (reduced.height, reduced.width) == (rows, columns) else self
 
     def check_resolution(self, rows: int, columns: int) -> None:
         """Check that the intrinsics belong to images of a size.
@@ -101,6 +113,8 @@ class Intrinsics:
                 f"the intrinsics are for {self.width} × {self.height} pixels, the frame has "
                 f"{columns} × {rows}: scale them, or give those of the depth image",
             )
+        if not known and self.cx is not None:
+            self._check_order(rows, columns)
         for name, value, size in (("cx", self.cx, columns), ("cy", self.cy, rows)):
             if value is not None and not -0.5 * size <= value <= 1.5 * size:
                 raise FrameError(
@@ -111,17 +125,34 @@ class Intrinsics:
                 )
         if known or self.cx is None or self.cy is None:
             return
-        # A cut-out frame is unlikely to have the same scale in both directions.
+        # A cut-out frame is unlikely to have the same scale in both directions, or a usual one.
         scale, other = (2 * self.cx + 1) / columns, (2 * self.cy + 1) / rows
         is_whole = scale > _LEAST_SCALE and abs(scale - other) < _SAME_SCALE * scale
-        if is_whole and abs(scale - 1) > OFF_CENTRE:
+        is_usual = any(max(abs(scale / s - 1), abs(other / s - 1)) < _USUAL_SCALE for s in _SCALES)
+        if is_usual or (is_whole and abs(scale - 1) > OFF_CENTRE):
             raise FrameError(
                 "other-resolution",
                 f"the principal point ({self.cx:g}, {self.cy:g}) is the centre of an image of "
-                f"{scale * columns:.0f} × {scale * rows:.0f} pixels, and the frame has {columns} × "
+                f"{scale * columns:.0f} × {other * rows:.0f} pixels, and the frame has {columns} × "
                 f"{rows}: give the intrinsics of this resolution; for a frame cut out of a larger "
                 "one, only the focal length, or also its own width and height",
             )
+
+    def _check_order(self, rows: int, columns: int) -> None:
+        """Raise FrameError if the numbers fit a frame in another usual order, but not in theirs."""
+
+        def fits(fx: float, fy: float, cx: float, cy: float) -> bool:
+            off = max(abs(cx / columns - 0.5), abs(cy / rows - 0.5))
+            return off < _CENTRAL and abs(fx - fy) < _SQUARE * fy
+
+        a, b, c, d = given = self.fx, self.fy, self.cx or 0.0, self.cy or 0.0
+        for order, numbers in (("fx,cx,fy,cy", (a, c, b, d)), ("cx,cy,fx,fy", (c, d, a, b))):
+            if fits(*numbers) and not fits(*given):
+                raise FrameError(
+                    "other-resolution",
+                    f"{a:g},{b:g},{c:g},{d:g} as fx,fy,cx,cy do not fit {columns} × {rows} pixels, "
+                    f"as {order} they do: give {','.join(f'{number:g}' for number in numbers)}",
+                )
 
     def doubts(self, rows: int, columns: int) -> tuple[str, ...]:
         """Return a sentence if the intrinsics may belong to an image of another size, else ()."""
@@ -141,10 +172,7 @@ class Intrinsics:
 def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
     """Return intrinsics from (f), (fx, fy, cx, cy), or a 3 × 3 matrix of numbers.
 
-    Raises
-    ------
-    UserError
-        Where the value has none of these forms.
+    Raise UserError where the value has none of these forms.
     """
     if isinstance(value, Intrinsics):
         return value
@@ -194,8 +222,9 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
 
     A camera file is JSON or YAML: BOP's ``camera.json`` (``fx, fy, cx, cy, width, height``) or
     ``cam_K``, each with or without ``depth_scale``; BOP's ``scene_camera.json``, with a camera for
-    each image; ROS's ``CameraInfo`` (``k`` or ``K``); or ``camera_matrix`` of ROS or of OpenCV's
-    ``FileStorage``, with its numbers in ``data`` or nested.
+    each image; ROS's ``CameraInfo`` (``k`` or ``K``); Open3D's ``intrinsic_matrix``; or
+    ``camera_matrix`` of ROS or of OpenCV's ``FileStorage``, with its numbers in ``data`` or nested.
+    Raise UserError where the text has none of these forms, or the file has no camera for the frame.
 
     Parameters
     ----------
@@ -204,11 +233,6 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     frame : path
         The number at the end of its stem selects the image in a ``scene_camera.json``, as BOP
         names images. The name does not matter if all images have the same camera.
-
-    Raises
-    ------
-    UserError
-        Where the text has none of these forms, or the file has no camera for the frame.
     """
     if text is None:
         return DepthCamera()
@@ -222,7 +246,7 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
         if not path.is_file():
             raise UserError(f"`intrinsics`={text}: {_what_is_missing(path)}")
         values = _read_mapping(path)
-        return _camera_of_mapping(_image_entry(values, path, Path(frame)), path)
+        return camera_of_values(_image_entry(values, path, Path(frame)), path)
     except UserError:
         raise
     except Exception as error:
@@ -275,12 +299,19 @@ def _read_mapping(path: Path) -> Mapping[str, Any]:
     return values
 
 
-def _camera_of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
+def camera_of_values(values: Mapping[str, Any], path: str | Path) -> DepthCamera:
+    """Return the camera of the names and values of a camera file, or of a ROS ``CameraInfo``.
+
+    `path` is used in messages, which are those of `camera_of`.
+    """
+    if isinstance(values.get("intrinsic"), Mapping):
+        values = values["intrinsic"]
     size = (
         values.get("width", values.get("image_width")),
         values.get("height", values.get("image_height")),
     )
-    matrix = next((values[k] for k in ("cam_K", "k", "K", "camera_matrix") if k in values), None)
+    names = ("cam_K", "k", "K", "camera_matrix", "intrinsic_matrix")
+    matrix = next((values[name] for name in names if name in values), None)
     if matrix is None:
         absent = [name for name in ("fx", "fy", "cx", "cy") if name not in values]
         if absent:
@@ -291,7 +322,8 @@ def _camera_of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
     try:
         given = as_intrinsics(_numbers_of(matrix))
         width, height = (int(side) if isinstance(side, float) else side for side in size)
-        intrinsics = Intrinsics(given.fx, given.fy, given.cx, given.cy, width, height)
+        intrinsics = replace(given, width=width, height=height)
+        intrinsics = replace(intrinsics, reduced=_reduced(intrinsics, values))
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
     unit_m = _unit_m(values.get("depth_scale"), path)
@@ -300,10 +332,34 @@ def _camera_of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
 
 def _numbers_of(matrix: Any) -> Any:
     # ROS and OpenCV keep them with the number of rows and columns.
-    return matrix.get("data") if isinstance(matrix, Mapping) else matrix
+    numbers = matrix.get("data") if isinstance(matrix, Mapping) else matrix
+    # Open3D writes a matrix column by column, so that its last row comes last in every third.
+    if isinstance(numbers, list) and len(numbers) == 9 and numbers[2::3] == [0, 0, 1]:
+        return [numbers[i] for column in range(3) for i in range(column, 9, 3)]
+    return numbers
 
 
-def _distortion_warnings(values: Mapping[str, Any], path: Path) -> tuple[str, ...]:
+def _reduced(whole: Intrinsics, values: Mapping[str, Any]) -> Intrinsics | None:
+    """Return the intrinsics of binned or cut-out images, which CameraInfo does not scale itself."""
+    roi, binning = values.get("roi") or {}, [values.get(f"binning_{axis}") or 1 for axis in "xy"]
+    names = ("x_offset", "y_offset", "width", "height")
+    is_mapping = isinstance(roi, Mapping)
+    window: list[Any] = [roi.get(name) or 0 for name in names] if is_mapping else [None]
+    if not all(isinstance(n, int | float) and 0 <= n < math.inf for n in (*binning, *window)):
+        raise UserError("binning and roi are not numbers of pixels, 0 or more; correct them there")
+    (across, down), (x, y, width, height) = binning, window
+    width, height = (width or whole.width or 0) // across, (height or whole.height or 0) // down
+    if (
+        whole.cx is None
+        or whole.cy is None
+        or (width, height) in ((0, 0), (whole.width, whole.height))
+    ):
+        return None
+    cx, cy = (whole.cx - x + 0.5) / across - 0.5, (whole.cy - y + 0.5) / down - 0.5
+    return Intrinsics(whole.fx / across, whole.fy / down, cx, cy, width, height)
+
+
+def _distortion_warnings(values: Mapping[str, Any], path: str | Path) -> tuple[str, ...]:
     """Return a sentence for coefficients of distortion that are not 0."""
     return tuple(
         f"{path}: the lens distortion ({name}) is not corrected: give rectified depth frames (ROS: "
@@ -314,7 +370,7 @@ def _distortion_warnings(values: Mapping[str, Any], path: Path) -> tuple[str, ..
     )[:1]
 
 
-def _unit_m(depth_scale: Any, path: Path) -> float:
+def _unit_m(depth_scale: Any, path: str | Path) -> float:
     """Return metres per unit from BOP's millimetres per unit."""
     if depth_scale is None:
         return MILLIMETRE

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from nbv.errors import FrameError, UserError
-from nbv.frames.depth_files import DepthImage, is_in_mask, single_mask
+from nbv.frames.depth_files import DepthImage, as_mask
 
 Mask = NDArray[np.bool_]
 
@@ -46,32 +46,19 @@ def object_mask(
     near_m: float | None = None,
     far_m: float | None = None,
 ) -> Mask:
-    """Return the pixels of the object where depth was measured.
+    """Return the pixels (rows, columns) of the object where depth was measured, without islands.
 
-    Parameters
-    ----------
-    depth_m : (rows, columns) float32
-        Metres; 0 where nothing was measured.
-    reach_m : float
-        Depth of the object behind its nearest point, metres. Used without mask and `far_m`: the
-        object is then the surface nearest to the camera.
-    mask : (rows, columns), optional
-        Not 0 at the object's pixels.
-    near_m, far_m : float, optional
-        The object lies between them, metres.
-
-    Returns
-    -------
-    (rows, columns) bool
-        Without `ISLAND` parts.
+    `depth_m` (rows, columns) is 0 where nothing was measured. The mask is one that
+    `nbv.frames.depth_files.as_mask` takes. Without it and `far_m`, the object is the surface
+    nearest to the camera, and reaches `reach_m` behind its nearest point.
 
     Raises
     ------
     FrameError
         ``empty-mask``, ``little-depth`` or ``two-objects``.
     UserError
-        Where mask and frame have different sizes, several masks are given, or the limits are not a
-        range.
+        Where the mask is not one of one object, it has another size than the frame, or the limits
+        are not a range.
     """
     inside = depth_m > 0
     if not np.count_nonzero(inside):
@@ -80,7 +67,7 @@ def object_mask(
             "the frame has no depth at all, no number above 0: is the sensor covered or too close?",
         )
     if mask is not None:
-        given = single_mask(is_in_mask(mask), "mask")
+        given = as_mask(mask)
         if given.shape != depth_m.shape:
             raise UserError(
                 f"the mask has {_size(given.shape)} pixels and the frame {_size(depth_m.shape)}: "
@@ -104,7 +91,12 @@ def object_mask(
     if mask is None and far_m is None and inside.any():
         inside &= depth_m < np.quantile(depth_m[inside], NEAREST_SHARE) + reach_m
     if np.count_nonzero(inside) < _LEAST_PIXELS:
-        limits = "" if near_m is None and far_m is None else _limits(depth_m, near, far)
+        limits, measured = "", depth_m[depth_m > 0]
+        if near_m is not None or far_m is not None:
+            limits = (
+                f" between `near_m`={near:g} and `far_m`={far:g}, of {measured.min():.2f} to "
+                f"{measured.max():.2f} m in the frame"
+            )
         raise FrameError(
             "empty-mask",
             f"{np.count_nonzero(inside)} pixels of the object have a depth{limits}; need 30",
@@ -127,14 +119,6 @@ def _without_islands(inside: Mask) -> Mask:
             f"two separate parts of {largest} and {second} pixels: mask one of them",
         )
     return np.asarray(np.append(False, sizes >= ISLAND * largest)[parts])
-
-
-def _limits(depth_m: DepthImage, near: float, far: float) -> str:
-    measured = depth_m[depth_m > 0]
-    return (
-        f" between `near_m`={near:g} and `far_m`={far:g}, of {measured.min():.2f} to "
-        f"{measured.max():.2f} m in the frame"
-    )
 
 
 def _size(shape: tuple[int, ...]) -> str:

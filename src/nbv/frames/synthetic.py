@@ -49,14 +49,8 @@ CAMERAS = {
 class Frame:
     """A depth frame and its ground truth.
 
-    Attributes
-    ----------
-    depth_m : (480, columns) float32
-        Metres; 0 where nothing was measured.
-    mask : (480, columns) bool
-        Pixels of the object with a depth.
-    azimuth_deg, elevation_deg : float
-        Position of the camera around the object.
+    Depth (480, columns) is in metres, 0 where nothing was measured. The mask (480, columns) has the
+    pixels of the object with a depth. The angles are the camera's position around the object.
     """
 
     depth_m: DepthImage
@@ -78,26 +72,12 @@ def draw_frame(
 ) -> Frame:
     """Return a frame that a depth camera would take of a mesh.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        A mesh of unit diagonal.
-    azimuth_deg, elevation_deg : float
-        Position of the camera, which points at the object.
-    distance_m : float
-        Distance of the camera from the object, metres.
-    diagonal_m : float
-        Diagonal of the object's bounding box, metres.
-    seed : int
-        Seed of the noise.
-    sensor : str
-        A name in `CAMERAS`. ``none`` gives the true depth in the Kinect's image.
+    Raise UserError where an angle is invalid, the distance is implausible or below the sensor's
+    range, the sensor is unknown, or the seed is negative.
 
-    Raises
-    ------
-    UserError
-        Where an angle is invalid, the distance is implausible or below the sensor's range, the
-        sensor is unknown, or the seed is negative.
+    The mesh has a unit diagonal, and `diagonal_m` is that of the object's bounding box. The camera
+    points at the object; the sensor is one of `CAMERAS`, where ``none`` gives the true depth in the
+    Kinect's image. The seed is that of the noise.
     """
     _check_view(azimuth_deg, elevation_deg, distance_m, diagonal_m)
     if sensor not in CAMERAS:
@@ -169,10 +149,8 @@ def example_mesh() -> Mesh:
 def read_mesh(path: str | Path, up: str = "+z", front: str = "+x") -> Mesh:
     """Read a mesh file and scale it to unit diagonal; `up` and `front` name axes of the file.
 
-    Raises
-    ------
-    UserError
-        Where the suffix is not one of `EXTENSIONS`, the file cannot be read, or it has no surface.
+    Raise UserError where the suffix is not one of `EXTENSIONS`, the file cannot be read, or it has
+    no surface.
     """
     if Path(path).suffix.lower() not in EXTENSIONS:
         raise UserError(f"{path}: unknown kind of mesh file; give {', '.join(EXTENSIONS)}")

@@ -11,10 +11,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.core.orientations.group import ASYMMETRIC, Orientations, along_ray, inverse
-from nbv.errors import UserError, nearest
+from nbv.errors import UserError, by_number, nearest
 from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
-from nbv.numbers import column, orientation_column, position_column
+from nbv.numbers import (
+    ROUNDED,
+    as_finite,
+    as_orientations,
+    as_position,
+    column,
+    orientation_column,
+    position_column,
+)
 from nbv.tables.detections import Detections
 from nbv.tables.orientation_table import FLIP_DEG, OrientationTable
 
@@ -51,6 +59,8 @@ def read_orientation_table(
 ) -> OrientationTable:
     """Read pairs of orientations.
 
+    A UserError names the file and the row.
+
     Parameters
     ----------
     path : path
@@ -70,11 +80,6 @@ def read_orientation_table(
         Estimates of lower scores are left out.
     rows : DataFrame, optional
         The rows of the file, where they have been read.
-
-    Raises
-    ------
-    UserError
-        Names the file and the row.
     """
     path = Path(path)
     given = read_rows(path, ()) if rows is None else rows
@@ -105,13 +110,19 @@ def read_orientation_table(
     ]
     if n_missed := int(missed.sum()):
         left_out.append(f"{n_missed} of {n_missed + len(rows)} instances have no estimate")
-    symmetries = {} if models_info is None else read_models_info(models_info)
-    known = list(dict.fromkeys(rows["object_id"]))
+    symmetries = {} if models_info is None else _read_entries(Path(models_info))
+    known = set(rows["object_id"])
     for name in objects:
         if name not in known:
             raise UserError(f"{path}: no object {name}: {nearest(name, known)}")
     if objects:
         rows = rows[rows["object_id"].isin(objects)]
+    absent = sorted(set(rows["object_id"]) - set(symmetries), key=by_number)
+    if models_info is not None and absent:
+        left_out.append(
+            f"{models_info} has no entry for object {', '.join(absent)} (it has "
+            f"{', '.join(list(symmetries)[:5]) or 'none'}): taken to have no symmetry"
+        )
     counts = rows["object_id"].value_counts()
     for name in dict.fromkeys(rows["object_id"]):
         if counts[name] < FEWEST_PAIRS:
@@ -125,6 +136,9 @@ def read_orientation_table(
             left_out.append(f"{few}: left out")
     rows = rows[rows["object_id"].map(counts) >= FEWEST_PAIRS]
     truths, estimates = (orientation_column(path, rows, name) for name in TABLE_COLUMNS[1:])
+    for name, read in zip(TABLE_COLUMNS[1:], (truths, estimates), strict=True):
+        if (column(path, rows, name, 9) != read.reshape(-1, 9)).any():
+            left_out.append(f"{name}: {ROUNDED}")
     score = column(path, rows, "score") if "score" in rows else None
     positions = position_column(path, rows, "t_true_mm") if "t_true_mm" in rows else None
     _check_way_round(path, rows, truths, estimates)
@@ -162,7 +176,12 @@ def groups_of(rows: pd.DataFrame) -> NDArray[np.str_]:
 
 
 def _with_keys(path: Path, rows: pd.DataFrame) -> pd.DataFrame:
-    rows = rows.assign(**{key: column(path, rows, key).astype(int).astype(str) for key in KEYS})
+    for key in KEYS:
+        numbers = column(path, rows, key)
+        if (is_part := numbers % 1 != 0).any():
+            row = rows.index[is_part.argmax()]
+            raise UserError(f"{path}, row {row + 2}: {key} {rows[key][row]} is no integer")
+        rows = rows.assign(**{key: numbers.astype(int).astype(str)})
     return rows.assign(image=rows["scene_id"] + "/" + rows["im_id"], object_id=rows["obj_id"])
 
 
@@ -184,12 +203,13 @@ def _matched(
     The number of instances without an estimate follows, by object.
     """
     if truth.suffix.lower() == ".csv":
-        known = read_rows(truth, (*KEYS, "R", "t"))
+        known = _with_keys(truth, read_rows(truth, (*KEYS, "R", "t")))
+        images = set(known["image"])
     else:
-        known = _read_scenes(truth, set(given["scene_id"]))
-    known = _with_keys(truth, known)
-    is_known = given["scene_id"].isin(known["scene_id"])
-    if (is_other := is_known & ~given["image"].isin(known["image"])).any():
+        known, images = _read_scenes(truth, set(given["image"]))
+        known = _with_keys(truth, known)
+    is_known = given["scene_id"].isin({image.split("/")[0] for image in images})
+    if (is_other := is_known & ~given["image"].isin(images)).any():
         row = given.index[is_other][0]
         raise UserError(
             f"{path}, row {row + 2}: scene {given['scene_id'][row]} has no image "
@@ -251,33 +271,39 @@ def _with_instances(truth: Path, known: pd.DataFrame) -> NDArray[np.object_]:
     return scenes
 
 
-def _read_scenes(folder: Path, scenes: set[str]) -> pd.DataFrame:
-    """Read the truths of scenes as texts, in the form of results."""
-    truths = []
-    for scene in sorted(scenes):
+def _read_scenes(folder: Path, wanted: set[str]) -> tuple[pd.DataFrame, set[str]]:
+    """Read the truths of images as texts, in the form of results, and which images there are."""
+    truths, images = [], set()
+    for scene in sorted({image.split("/")[0] for image in wanted}):
         file = folder / f"{int(scene):06d}" / "scene_gt.json"
         if not file.is_file():
             continue
         for image, entries in _read_entries(file).items():
             try:
-                for entry in entries:
-                    r, t = (" ".join(map(str, entry[f"cam_{k}_m2c"])) for k in "Rt")
-                    truths.append((scene, image, str(int(entry["obj_id"])), r, t))
+                images.add(name := f"{scene}/{int(image)}")
+                for i, entry in enumerate(entries if name in wanted else ()):
+                    where = f"{file}, image {image}, instance {i}"
+                    given = entry["cam_R_m2c"], entry["cam_t_m2c"], entry["obj_id"]
+                    r = as_finite(given[0], f"{where}: cam_R_m2c", 9)
+                    as_orientations(r.reshape(3, 3), f"{where}: cam_R_m2c")
+                    t = as_position(given[1], f"{where}: cam_t_m2c")
+                    if as_finite(given[2], f"{where}: obj_id", 1).item() % 1:
+                        raise UserError(f"{where}: obj_id {given[2]} is no integer")
+                    numbers = (" ".join(map(repr, each.tolist())) for each in (r, t))
+                    truths.append((scene, image, str(given[2]), *numbers))
             except (KeyError, TypeError, ValueError):
                 raise UserError(
                     f"{file}, image {image}: an instance lacks obj_id, cam_R_m2c or cam_t_m2c"
                 ) from None
-    if not truths:
-        raise UserError(f"{folder} has no <scene>/scene_gt.json of a scene of the estimates")
-    return pd.DataFrame(truths, columns=[*KEYS, "R", "t"])
-
-
-def read_models_info(path: str | Path) -> dict[str, Any]:
-    """Read the entries of BOP's ``models_info.json`` by object."""
-    return _read_entries(Path(path))
+    if not images:
+        found = next(folder.glob("*/scene_gt_*.json"), None)
+        hint = "" if found is None else f"; copy {found} there, or that of the camera in use"
+        raise UserError(f"{folder} has no <scene>/scene_gt.json of a scene of the estimates{hint}")
+    return pd.DataFrame(truths, columns=[*KEYS, "R", "t"], dtype=str), images
 
 
 def _read_entries(path: Path) -> dict[str, Any]:
+    """Read BOP's ``models_info.json`` by object, or ``scene_gt.json`` by image."""
     given = read_given_json(path, remedy := "give a JSON file of BOP")
     if not isinstance(given, dict):
         raise damaged(path, "it is not a JSON object", remedy)

@@ -12,19 +12,11 @@ from nbv.labels import counted
 class Detections:
     """What became of an object's detections.
 
-    Attributes
-    ----------
-    matched, farther, surpassed : sequence of float
-        Scores of the detections that are calibration pairs, of those that are farther than
-        `nearest_mm` from every instance, and of those beside one of a better score.
-    n_missed : int
-        Instances without an estimate, in the images that have estimates.
-    n_failed : int
-        Answers of the estimator without a pose.
-    nearest_mm : float or None
-        None for a table of pairs, which says nothing of other detections.
-    least_score : float or None
-        Detections of lower scores were left out.
+    There are scores of those that are calibration pairs (`matched`), of those that are `farther`
+    than `nearest_mm` from every instance, and of those beside one of a better score (`surpassed`).
+    A table of pairs says nothing of other detections: there `nearest_mm` is None. Detections below
+    `least_score` were left out. `n_missed` instances, in images that have estimates, have none;
+    `n_failed` answers of the estimator are without a pose.
     """
 
     matched: Sequence[float] = ()

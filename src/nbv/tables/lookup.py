@@ -39,16 +39,10 @@ class CostMove(Move):
 
 @dataclass(frozen=True, kw_only=True)
 class CostRecommendation(Answer[CostMove]):
-    """The rotations for an estimated azimuth, best first.
+    """The rotations for an estimated azimuth, in [0, 360), best first.
 
-    Attributes
-    ----------
-    azimuth_deg : float
-        The estimate, in [0, 360).
-    expected_error_deg : float
-        That of one view where costs are errors of calibration objects, else NaN.
-    criterion, cost_unit : str
-        What the cost of a move is, and its unit.
+    The criterion says what the cost of a move is. Where costs are errors of calibration objects,
+    the expected error is that of one view, else NaN.
     """
 
     azimuth_deg: float

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from nbv.choice.answers import Answer, RankedMove
 from nbv.choice.next_view import as_chances
-from nbv.choice.rotations import MIN_SEPARATION_DEG, as_travel
+from nbv.choice.rotations import MIN_SEPARATION_DEG, as_limit_deg
 from nbv.core.alike.compare import WITHIN_DEG
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief, belief, hypotheses_belief
 from nbv.core.orientations.criteria import bayes_error, optimism_deg, view_angle_deg
 from nbv.core.orientations.errors import OrientationErrors
 from nbv.core.orientations.group import Array, Orientations, Symmetry, along_ray, inverse
 from nbv.errors import UserError
-from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted, matrix_lines
-from nbv.numbers import FARTHEST_M, Pose, as_finite, as_orientations, as_pose, as_position
+from nbv.numbers import FARTHEST_M, as_finite, as_position
+from nbv.poses import AnyPose, Pose, Source, as_given, as_pose, read_entries
+from nbv.tables.camera_poses import contradictions
 
 INDEPENDENT_DEG = 60.0
 """Angle between views from which their errors are about independent (first half of T-LESS)."""
@@ -32,6 +32,14 @@ helps (tools/promised_errors.py)."""
 
 MOST_VIEWS = 4
 """Views of an object after which a walk ends, whatever the decision."""
+
+MOST_ON_SPHERE = 10_000
+
+BLOCK = 1000
+"""Candidates that are compared at once, for memory."""
+
+NO_SCORE = -1.0
+"""BOP's score of an estimator that has none."""
 
 NO_DEPENDENCE = (
     "calibration shows no dependence of this object's flips on the view: candidates are ranked by "
@@ -51,46 +59,65 @@ class PoseEstimate:
     Attributes
     ----------
     rotation : ndarray (3, 3)
-        Object to camera.
+        Object to camera. It is made of any pose that `nbv.poses.as_given` takes, such as a 4 × 4
+        matrix, which has the position too.
     position_mm : ndarray (3,) or None
         The object in the camera.
     score : float or None
+        Higher is better.
     camera_pose : ndarray (4, 4) or None
-        Camera to base. Estimates without it are hypotheses of the same image.
+        Camera to base, metres. Estimates without it are hypotheses of the same image.
+    frame_id, base_frame_id : str or None
+        The frames that ROS messages named, of the estimate and of the camera's pose.
+    warnings : tuple of str
+        What to say of the pose as it was given.
+
+    Raises
+    ------
+    UserError
+        If a pose is none, or the camera cannot see the object there.
 
     Examples
     --------
     >>> import nbv, numpy as np
     >>> nbv.PoseEstimate(np.eye(3), score=0.4).position_mm is None
     True
+    >>> pose = [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0.7], [0, 0, 0, 1]]  # metres
+    >>> nbv.PoseEstimate(np.array(pose)).position_mm.tolist()
+    [100.0, 0.0, 700.0]
     """
 
     rotation: Orientations
     position_mm: Array | None = None
     score: float | None = None
     camera_pose: Pose | None = None
+    frame_id: str | None = None
+    base_frame_id: str | None = None
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Convert poses of every form."""
+        pose, position, camera = as_given(self.rotation, "pose"), self.position_mm, None
+        if self.camera_pose is not None:
+            camera = as_given(self.camera_pose, "camera pose")
+        for name, value in {
+            "rotation": pose.rotation,
+            "position_mm": pose.position_mm if position is None else as_position(position, "t"),
+            "camera_pose": camera and camera.camera_pose,
+            "frame_id": self.frame_id or pose.frame_id,
+            "base_frame_id": self.base_frame_id or (camera and camera.frame_id),
+            "warnings": (*self.warnings, *pose.warnings),
+        }.items():
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CameraMove(RankedMove):
-    """A candidate camera pose.
+    """A candidate camera pose, with its number from 0.
 
-    Attributes
-    ----------
-    index : int
-        The candidate's number, from 0.
-    travel_deg : float
-        Angle to the last view, about the object.
-    travel_m : float or None
-        Distance to the last view.
-    expected_error_deg : float
-        Expected error of the pose after a view there.
-    probability_within : dict of str to float
-        Probability that the error after this view is below 5, 15 and 30 degrees.
-    target_camera_pose : ndarray (4, 4) or None
-        None where the object's position is unknown.
-    direction : ndarray (3,)
-        Direction from which the object is seen, in the frame of the camera poses.
+    `travel_deg` is the angle to the last view, about the object, and `travel_m` the distance if it
+    is known. `direction` (3,) is that from which the object is seen, in the frame of the camera
+    poses. `target_camera_pose` is None where the object's position is unknown.
     """
 
     index: int
@@ -114,7 +141,9 @@ class CameraMove(RankedMove):
 class CameraRecommendation(Answer[CameraMove]):
     """The pose (3, 3) in the last camera, its belief in the first one, and candidates.
 
-    `holds_where` says for which share of detections calibration holds, if that is known.
+    `holds_where` says for which share of detections calibration holds, if that is known. Targets
+    and directions are `in_base`, or else in the only camera, whose pose is not known.
+    `camera_frame_id` is the frame that a ROS message named for the estimate.
     `bounds_deg` are those bounds of `nbv.forecast` that are of such answers.
     """
 
@@ -123,6 +152,8 @@ class CameraRecommendation(Answer[CameraMove]):
     pose_belief: OrientationBelief
     holds_where: str | None = None
     bounds_deg: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    in_base: bool = True
+    camera_frame_id: str | None = None
 
     STOP_PROBABILITY = 0.97
     STOP_WITHIN_DEG = AGREE_DEG
@@ -132,6 +163,11 @@ class CameraRecommendation(Answer[CameraMove]):
         if not 0.0 < within_deg <= 180.0:
             raise UserError(f"`within_deg`={within_deg:g}: give degrees, above 0 and at most 180")
         return self.pose_belief.probability_within(within_deg)
+
+    @property
+    def frame(self) -> str:
+        """The frame of the targets."""
+        return super().frame if self.in_base else "frame of the present camera"
 
     def pose_lines(self, seen: str) -> list[str]:
         """Return the pose of the object, which is called `seen`, in a few lines of text."""
@@ -143,36 +179,17 @@ class CameraRecommendation(Answer[CameraMove]):
             for name, of in self.bounds_deg.items()
             if of
         ]
-        return [f"rotation, {seen} to camera", *rows, self.value(self), *bounds, *holds]
-
-
-@dataclass(frozen=True)
-class _Camera:
-    """A camera in the base frame, and the camera at its place that looks straight at the object.
-
-    Attributes
-    ----------
-    pose : ndarray (4, 4)
-        Camera to base.
-    straight_from_camera : ndarray (3, 3)
-        The identity where the object's position or that of calibration is unknown.
-    """
-
-    pose: Pose
-    straight_from_camera: Orientations
-
-    @property
-    def straight_from_base(self) -> Orientations:
-        return np.asarray(self.straight_from_camera @ self.pose[:3, :3].T)
+        camera = "camera" if self.camera_frame_id is None else self.camera_frame_id
+        return [f"rotation, {seen} to {camera}", *rows, self.value(self), *bounds, *holds]
 
 
 def recommend_camera(
     errors: OrientationErrors,
     estimates: Sequence[PoseEstimate],
-    candidates: Sequence[Pose] | int,
+    candidates: Sequence[AnyPose] | int,
     *,
     straightened: bool,
-    camera_pose: ArrayLike | None,
+    camera_pose: AnyPose | None,
     max_travel_deg: float,
 ) -> CameraRecommendation:
     """Rank camera poses by an object's errors; see `nbv.OrientationTable.recommend`."""
@@ -181,46 +198,70 @@ def recommend_camera(
     if is_posed and camera_pose is not None:
         raise UserError("the estimates have camera poses; leave `camera_pose` out")
     base = np.eye(4) if camera_pose is None else as_pose(camera_pose)
-    cameras = [
-        _Camera(
-            base if e.camera_pose is None else e.camera_pose,
-            _straightening(e.position_mm, straightened),
-        )
+    cameras = [base if e.camera_pose is None else e.camera_pose for e in estimates]
+    camera, position = cameras[-1], estimates[-1].position_mm
+    # At each camera's place, one that looks straight at the object, if positions are known.
+    straight = [
+        np.eye(3) if e.position_mm is None or not straightened else along_ray(e.position_mm)
         for e in estimates
     ]
-    straight_from_base = np.stack([camera.straight_from_base for camera in cameras])
-    first, last = straight_from_base[0], straight_from_base[-1]
-    seen = np.stack(
-        [c.straight_from_camera @ e.rotation for c, e in zip(cameras, estimates, strict=True)]
+    straight_from_base = np.stack(
+        [rotation @ pose[:3, :3].T for rotation, pose in zip(straight, cameras, strict=True)]
     )
+    kept = _different(straight_from_base) if is_posed else np.arange(len(cameras))
+    first, last = straight_from_base[kept[0]], straight_from_base[-1]
+    seen = np.stack([s @ e.rotation for s, e in zip(straight, estimates, strict=True)])
     ratio, ratios, warnings = None, np.ones(len(seen)), [NO_SCORES]
     if scores is not None and errors.ratio is not None:
         ratio, ratios, warnings = errors.ratio, errors.ratio(scores), []
     if is_posed:
-        now = belief(errors, seen, straight_from_base @ first.T, ratios)
+        now = belief(errors, seen[kept], straight_from_base[kept] @ first.T, ratios[kept])
+        if position is not None:
+            at_m = [e.position_mm / 1000 for e in estimates if e.position_mm is not None]
+            rotations = np.array([estimate.rotation for estimate in estimates])
+            warnings += contradictions(
+                np.array(cameras), np.array(at_m), rotations, errors.symmetry
+            )
     else:
         order = slice(None) if scores is None else np.argsort(-scores, kind="stable")
         now = hypotheses_belief(errors, seen[order], ratios[order])
-    position = estimates[-1].position_mm
-    place = None if position is None else (cameras[-1].pose @ np.append(position / 1000, 1.0))[:3]
+    if n_again := len(seen) - len(kept):
+        warnings.append(
+            f"{n_again} of {len(seen)} views are within {MIN_SEPARATION_DEG:g}° of a later one and "
+            "do not count: the same view repeats its error"
+        )
+    if (away_m := np.linalg.norm(camera[:3, 3])) > FARTHEST_M:
+        warnings.append(
+            f"the camera is {away_m:.0f} m from the origin of the base frame: are its poses in "
+            "millimetres? give metres"
+        )
+    place = None if position is None else (camera @ np.append(position / 1000, 1.0))[:3]
+    in_base = camera_pose is not None or is_posed
     if isinstance(candidates, int):
-        is_level = camera_pose is None and not is_posed
-        poses, is_known = _sphere(candidates, place, cameras[-1].pose, is_level), place is not None
+        poses, is_known = _sphere(candidates, place, camera, in_base), place is not None
     else:
         given = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
         poses = np.array(given).reshape(-1, 4, 4)
         is_known = True
-    targets = _straight_targets(poses, place, straightened)
+    targets, is_away = _straight_targets(poses, place, straightened)
+    if n_away := int(is_away.sum()):
+        warnings.append(
+            f"{n_away} of {counted(len(poses), 'candidate')} look away from the object, candidate "
+            f"{is_away.argmax()} first, and are left out"
+        )
     travel = view_angle_deg(targets @ last.T)
     apart = np.min([view_angle_deg(targets @ taken.T) for taken in straight_from_base], axis=0)
-    free = np.flatnonzero((apart >= MIN_SEPARATION_DEG) & (travel <= as_travel(max_travel_deg)))
+    is_near = travel <= as_limit_deg("max_travel_deg", max_travel_deg)
+    free = np.flatnonzero((apart >= MIN_SEPARATION_DEG) & is_near & ~is_away)
     if not len(free):
         raise UserError(
             f"none of {counted(len(poses), 'candidate')} is {MIN_SEPARATION_DEG:g}° or more from "
             "every view so far and within `max_travel_deg`: the same view repeats its error"
         )
     ahead = targets[free] @ first.T
-    cost, within = bayes_error(now, ahead, WITHIN_DEG, ratio)
+    blocks = np.split(ahead, range(BLOCK, len(ahead), BLOCK))
+    parts = zip(*(bayes_error(now, block, WITHIN_DEG, ratio) for block in blocks), strict=True)
+    cost, within = (np.concatenate(part, axis=-1) for part in parts)
     cost += optimism_deg(now, ahead, cost, ratio)
     if errors.depends_on_view:
         ranked = np.lexsort((travel[free], cost.round(9)))
@@ -233,9 +274,7 @@ def recommend_camera(
         CameraMove(
             index=int(free[k]),
             travel_deg=float(travel[free[k]]),
-            travel_m=float(np.linalg.norm(pose[:3, 3] - cameras[-1].pose[:3, 3]))
-            if is_known
-            else None,
+            travel_m=float(np.linalg.norm(pose[:3, 3] - camera[:3, 3])) if is_known else None,
             expected_error_deg=float(cost[k]),
             probability_within=as_chances(within[:, k]),
             target_camera_pose=pose if is_known else None,
@@ -245,12 +284,13 @@ def recommend_camera(
     ]
     within_now = [now.probability_within(error_deg) for error_deg in WITHIN_DEG]
     return CameraRecommendation(
-        rotation=cameras[-1].straight_from_camera.T @ last @ first.T @ now.pose,
+        rotation=straight[-1].T @ last @ first.T @ now.pose,
         expected_error_deg=now.error_deg,
         probability_within=as_chances(within_now),
         moves=tuple(moves),
         depends_on_view=errors.depends_on_view,
         pose_belief=now,
+        in_base=in_base,
         warnings=tuple(warnings),
         helps=bool(cost[ranked[0]] < HELPFUL * now.error_deg),
         no_flips=not errors.is_flip.any(),
@@ -292,19 +332,51 @@ def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:
     return np.array(scores) if scores else None
 
 
-def _straightening(position: Array | None, straightened: bool) -> Orientations:
-    if position is None or not straightened:
-        return np.eye(3)
-    return along_ray(position)
+def known_scores(
+    estimates: Sequence[PoseEstimate], calibrated: Array | None
+) -> tuple[Sequence[PoseEstimate], list[str]]:
+    """Return estimates without scores that mean none, and a warning of another scale.
+
+    `calibrated` (n,) are the scores of calibration, if it has any.
+    """
+    if calibrated is None or calibrated.min() >= 0:
+        estimates = [replace(e, score=None) if e.score == NO_SCORE else e for e in estimates]
+    if calibrated is None:
+        return estimates, []
+    low, high = calibrated.min(), calibrated.max()
+    margin = (high - low) / 2
+    least, most = (0, 1) if low >= 0 and high <= 1 else (low - margin, high + margin)
+    odd = [e.score for e in estimates if e.score is not None and not least <= e.score <= most]
+    return estimates, [
+        f"the score {score:g} is far from those of calibration, {low:g} to {high:g}: is it of "
+        "another scale, such as a logit?"
+        for score in odd[:1]
+    ]
 
 
-def _straight_targets(poses: Array, place: Array | None, straightened: bool) -> Orientations:
-    """Return base to candidates (n, 3, 3), straight at the object; `place` (3,) is its position."""
+def _different(straight_from_base: Orientations) -> NDArray[np.intp]:
+    """Return which views are `MIN_SEPARATION_DEG` or more from every later one that is kept."""
+    kept: list[int] = []
+    for i in reversed(range(len(straight_from_base))):
+        moves = straight_from_base[kept] @ straight_from_base[i].T
+        if (view_angle_deg(moves) >= MIN_SEPARATION_DEG).all():
+            kept.insert(0, i)
+    return np.array(kept)
+
+
+def _straight_targets(
+    poses: Array, place: Array | None, straightened: bool
+) -> tuple[Orientations, NDArray[np.bool_]]:
+    """Return base to candidates (n, 3, 3), straight at the object, and which of them look away.
+
+    `place` (3,) is the object's position.
+    """
     from_base = inverse(poses[:, :3, :3])
     if place is None:
-        return from_base
+        return from_base, np.zeros(len(poses), dtype=bool)
     position = (from_base @ (place - poses[:, :3, 3])[:, :, None])[..., 0]
-    if (behind := position[:, 2] <= 0).any():
+    behind = position[:, 2] <= 0
+    if behind.sum() > len(behind) / 2:
         raise UserError(
             f"candidate {behind.argmax()}: the object is behind this camera: give poses of the "
             "optical frame (z forward) in the base frame, camera to base, in metres"
@@ -315,14 +387,15 @@ def _straight_targets(poses: Array, place: Array | None, straightened: bool) -> 
             f"candidate {far.argmax()}: the object is {away[far.argmax()]:.0f} m away: give camera "
             "poses in metres, not millimetres"
         )
-    return along_ray(position) @ from_base if straightened else from_base
+    position[behind] = [0, 0, 1]
+    return along_ray(position) @ from_base if straightened else from_base, behind
 
 
-def _sphere(n: int, place: Array | None, pose: Pose, in_camera: bool) -> Array:
+def _sphere(n: int, place: Array | None, pose: Pose, in_base: bool) -> Array:
     """Return even camera poses (n, 4, 4) that look at the object from its distance, level."""
-    if n < 1:
-        raise UserError(f"`sphere`={n}: give 1 or more")
-    up = -pose[:3, 1] if in_camera else np.array([0.0, 0.0, 1.0])
+    if not 1 <= n <= MOST_ON_SPHERE:
+        raise UserError(f"`sphere`={n}: give 1 to {MOST_ON_SPHERE}")
+    up = np.array([0.0, 0.0, 1.0]) if in_base else -pose[:3, 1]
     distance = 1.0 if place is None else float(np.linalg.norm(place - pose[:3, 3]))
     centre = pose[:3, 3] + distance * pose[:3, 2] if place is None else place
     z = 1 - (2 * np.arange(n) + 1) / n
@@ -339,41 +412,21 @@ def _sphere(n: int, place: Array | None, pose: Pose, in_camera: bool) -> Array:
     return targets
 
 
-def as_view(given: Any, name: str) -> PoseEstimate:
-    """Return a view from R (9 numbers), or a mapping of R, t (mm), score and camera_pose.
+def as_view(given: Any, name: str, quaternion: str | None = None) -> PoseEstimate:
+    """Return a view from a pose of any form, or a mapping with a score and a camera_pose too.
 
-    Raises
-    ------
-    UserError
-        Names what is wrong.
+    A UserError names what is wrong.
     """
-    entry = given if isinstance(given, dict) else {"R": given}
-    if "R" not in entry or (odd := set(entry) - {"R", "t", "score", "camera_pose"}):
-        what = "has no R" if "R" not in entry else f"has {min(odd)!r}"
-        raise UserError(f"{name} {what}; give R, t (mm), score, camera_pose")
-    rotation = as_finite(entry["R"], f"{name}: R", 9).reshape(3, 3)
-    view = PoseEstimate(as_orientations(rotation, f"{name}: R"))
-    if (t := entry.get("t")) is not None:
-        view = replace(view, position_mm=as_position(t, f"{name}: t"))
-    if (score := entry.get("score")) is not None:
-        view = replace(view, score=as_finite(score, f"{name}: score", 1).item())
-    if (pose := entry.get("camera_pose")) is not None:
-        view = replace(view, camera_pose=as_pose(pose, f"{name}: camera_pose"))
-    return view
+    others = given if isinstance(given, Mapping) else {}
+    # The class makes arrays of them.
+    read: dict[str, Any] = {"rotation": as_given(given, name, quaternion)}
+    if (score := others.get("score")) is not None:
+        read["score"] = as_finite(score, f"{name}: score", 1).item()
+    if (camera := others.get("camera_pose")) is not None:
+        read["camera_pose"] = as_given(camera, f"{name}: camera_pose", quaternion)
+    return PoseEstimate(**read)
 
 
-def read_views(path: str | Path) -> list[PoseEstimate]:
-    """Read estimates: JSON as of `as_view`, one or a list, or ``.npy`` of (..., 3, 3)."""
-    path = Path(path)
-    if path.suffix.lower() != ".json":
-        array = read_numbers(path)
-        if array.dtype.kind not in "iuf" or array.size % 9 or not array.size:
-            raise UserError(f"{path}: shape {array.shape} instead of (..., 3, 3)")
-        given: Any = list(array.reshape(-1, 9))
-    else:
-        given = read_given_json(path, "give JSON, or an .npy array")
-        is_single = isinstance(given, dict) or np.size(given) == 9
-        given = [given] if is_single else given
-    if not isinstance(given, list):
-        raise UserError(f"{path} is not an estimate or a list of them")
-    return [as_view(entry, f"{path}, estimate {i}") for i, entry in enumerate(given)]
+def read_views(source: Source, quaternion: str | None = None) -> list[PoseEstimate]:
+    """Read estimates, the poses of `nbv.poses.read_entries`; errors as in `as_view`."""
+    return [as_view(given, name, quaternion) for name, given in read_entries(source, "estimate")]

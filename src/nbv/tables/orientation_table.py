@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from nbv.core.orientations.errors import FEWEST_GROUPS, OrientationErrors, ScoreRatio, shrinkage
 from nbv.core.orientations.group import (
@@ -21,14 +21,17 @@ from nbv.core.orientations.group import (
     spiral,
     viewing_direction,
 )
-from nbv.errors import UserError, nearest
+from nbv.errors import UserError, by_number, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
-from nbv.numbers import Pose, as_orientations, as_pose
+from nbv.numbers import as_orientations
+from nbv.poses import AnyPose
 from nbv.tables.detections import Detections
 from nbv.tables.next_camera import (
     MOST_VIEWS,
+    NO_SCORE,
     CameraRecommendation,
     PoseEstimate,
+    known_scores,
     nearest_twin,
     recommend_camera,
 )
@@ -41,19 +44,9 @@ _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "
 class ObjectSummary:
     """The calibration pairs of one object.
 
-    Attributes
-    ----------
-    object_id : str
-    n_pairs, n_groups, n_flips : int
-        Groups are instances or scenes; a flip errs by more than `FLIP_DEG`.
-    mean_error_deg : float
-    directions_covered : float
-        Share of the viewing directions that have pairs nearby.
-    depends_on_view : bool
-        Whether calibration shows that flips depend on the view.
-    warnings : tuple of str
-    holds_where : str or None
-        For which share of detections calibration holds.
+    Groups are instances or scenes; a flip errs by more than `FLIP_DEG`. `directions_covered` is the
+    share of the viewing directions that have pairs nearby. `depends_on_view` says whether
+    calibration shows that flips do, and `holds_where` for which share of detections it holds.
     """
 
     object_id: str
@@ -139,7 +132,8 @@ class OrientationTable:
         """
         known = self.object_ids
         if object_id is None and len(known) > 1:
-            raise UserError(f"the table has {len(known)} objects; name one of {', '.join(known)}")
+            choices = ", ".join(sorted(known, key=by_number))
+            raise UserError(f"the table has {len(known)} objects; name one of {choices}")
         name = known[0] if object_id is None else object_id
         if name not in known:
             raise UserError(f"object {name} is not in the table: {nearest(name, known)}")
@@ -148,6 +142,14 @@ class OrientationTable:
     def errors(self, object_id: str | None = None) -> OrientationErrors:
         """Return the errors on an object; its name and errors are those of `name_of`."""
         return self._errors[self.name_of(object_id)]
+
+    @property
+    def _scores(self) -> Array | None:
+        """Scores (n,), if every pair has one; BOP's for none is no score."""
+        score = self.score
+        if score is None or not np.isfinite(score).all() or (score == NO_SCORE).all():
+            return None
+        return score
 
     @cached_property
     def _errors(self) -> dict[str, OrientationErrors]:
@@ -164,8 +166,8 @@ class OrientationTable:
         }
         flips = np.concatenate([each.is_flip for each in errors.values()])
         share, ratio = (flips.sum() + 0.5) / (len(flips) + 1), None
-        if self.score is not None and np.isfinite(self.score).all():
-            scores = np.concatenate([self.score[k] for k in rows.values()])
+        if (known := self._scores) is not None:
+            scores = np.concatenate([known[k] for k in rows.values()])
             ratio = ScoreRatio.fit(scores, flips)
         strength = shrinkage(list(errors.values()))
         return {
@@ -183,10 +185,10 @@ class OrientationTable:
     def recommend(
         self,
         estimates: Sequence[PoseEstimate],
-        candidates: Sequence[Pose] | int,
+        candidates: Sequence[AnyPose] | int,
         *,
         object_id: str | None = None,
-        camera_pose: ArrayLike | None = None,
+        camera_pose: AnyPose | None = None,
         max_travel_deg: float = 180.0,
         previous: PoseEstimate | None = None,
     ) -> CameraRecommendation:
@@ -197,11 +199,12 @@ class OrientationTable:
         estimates : sequence of PoseEstimate
             Estimates of views in succession if each has its camera pose, else hypotheses of one
             view.
-        candidates : sequence of (4, 4), or int
-            Camera poses that can be reached; or how many even ones on a sphere about the object.
+        candidates : sequence of poses, or int
+            Camera poses that can be reached, in a form of `nbv.poses.as_given`; or how many even
+            ones on a sphere about the object.
         object_id : str, optional
             Needed where the table has several objects.
-        camera_pose : (4, 4), optional
+        camera_pose : (4, 4) or another form, optional
             Pose of the only view: optical frame in the base frame, metres. By default the base
             frame is the camera's.
         max_travel_deg : float
@@ -231,6 +234,7 @@ class OrientationTable:
         (False, True)
         """
         name = self.name_of(object_id)
+        estimates, doubts = known_scores(estimates, self._scores)
         answer = recommend_camera(
             self.errors(name),
             estimates,
@@ -241,13 +245,17 @@ class OrientationTable:
         )
         detections = self.detections.get(name, Detections())
         score = min((each.score for each in estimates if each.score is not None), default=None)
-        pose = estimates[-1].camera_pose if camera_pose is None else as_pose(camera_pose)
+        last, pose = estimates[-1], cast(Any, camera_pose)
+        last = last if pose is None else replace(last, camera_pose=pose)
+        given = dict.fromkeys(text for each in estimates for text in each.warnings)
         return replace(
             answer,
-            rotation=nearest_twin(answer.rotation, self.symmetry(name), pose, previous),
+            rotation=nearest_twin(answer.rotation, self.symmetry(name), last.camera_pose, previous),
             holds_where=detections.holds_where(score),
             bounds_deg=self._bounds_deg(name, estimates, answer.decision.verdict),
-            warnings=(*answer.warnings, *detections.warnings(score)),
+            warnings=(*answer.warnings, *doubts, *given, *detections.warnings(score)),
+            frame_id=last.frame_id if last.camera_pose is None else last.base_frame_id,
+            camera_frame_id=last.frame_id,
         )
 
     def _bounds_deg(

@@ -34,14 +34,9 @@ Sweeps = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 class PairTable:
     """Calibration pairs: true azimuths, estimates, and perhaps distributions.
 
-    Attributes
-    ----------
-    path : Path
-        The file, for messages.
-    rows : DataFrame
-        Columns ``object_id, azimuth_deg, estimate_deg`` and optionally, as text,
-        ``p0, p1, …, p<B-1>``: ``p<k>`` is the probability of the azimuth 360 k / B. The index
-        counts the rows of the file from 0.
+    The rows have ``object_id, azimuth_deg, estimate_deg`` and optionally, as text,
+    ``p0, p1, …, p<B-1>``: ``p<k>`` is the probability of the azimuth 360 k / B. Their index counts
+    the rows of the file from 0.
     """
 
     path: Path
@@ -51,10 +46,8 @@ class PairTable:
     def load(cls, path: str | Path) -> PairTable:
         """Read a CSV file of pairs, in any order.
 
-        Raises
-        ------
-        UserError
-            Where the file cannot be read, a column is missing, or a value is empty or not an angle.
+        Raise UserError where the file cannot be read, a column is missing, or a value is empty or
+        not an angle.
         """
         return cls.from_rows(path, read_rows(Path(path), COLUMNS))
 
@@ -76,10 +69,7 @@ class PairTable:
     def for_unit(self, category: str, elevation_deg: float) -> PairTable:
         """Return the rows of a category and an elevation, as far as columns distinguish them.
 
-        Raises
-        ------
-        UserError
-            Where no row is left.
+        Raise UserError where no row is left.
         """
         rows = self.rows
         for name, wanted in (("category", category), ("elevation_deg", elevation_deg)):
@@ -93,13 +83,8 @@ class PairTable:
     def estimates(self) -> Estimates:
         """Estimates of views one degree apart, with objects in the order of the file.
 
-        Views between those of the file have the error of the nearest one.
-
-        Raises
-        ------
-        UserError
-            Where an object has two views at one azimuth, or views are farther apart than
-            `WIDEST_GAP_DEG`.
+        Views between those of the file have the error of the nearest one. Raise UserError where an
+        object has two views at one azimuth, or views are farther apart than `WIDEST_GAP_DEG`.
         """
         for name, rows in self.rows.groupby("object_id", sort=False):
             _check_full_sweep(self.path, str(name), rows["azimuth_deg"].to_numpy(dtype=np.float64))
@@ -109,10 +94,7 @@ class PairTable:
     def thin_estimates(self) -> tuple[Estimates, tuple[str, ...]]:
         """The same of views at any azimuths, several at one too, and what is thin.
 
-        Raises
-        ------
-        UserError
-            Where azimuths seem to be radians.
+        Raise UserError where azimuths seem to be radians.
         """
         sweeps, gaps = {}, {}
         for name, rows in self.rows.groupby("object_id", sort=False):
@@ -134,13 +116,23 @@ class PairTable:
         return Estimates(tuple(sweeps), np.stack(list(sweeps.values()))), tuple(warnings)
 
     @property
+    def repeated(self) -> tuple[str, ...]:
+        """A warning where one estimate stands out and repeats: a program's word for none."""
+        estimate_deg = self.rows["estimate_deg"].to_numpy(dtype=np.float64)
+        for strange in (estimate_deg[estimate_deg < 0], estimate_deg[estimate_deg > 360]):
+            if len(strange) > 1 and (strange == strange[0]).all():
+                return (
+                    f"{len(strange)} of {counted(len(estimate_deg), 'estimate')} are exactly "
+                    f"{strange[0]:g}, and no other is like them: leave these rows out if it says "
+                    "that nothing was detected",
+                )
+        return ()
+
+    @property
     def distributions(self) -> Sweeps:
         """Distributions of each object's views; empty if the file has none.
 
-        Raises
-        ------
-        UserError
-            Where a column is missing between others, or a row is not a distribution.
+        Raise UserError where a column is missing between others, or a row is not a distribution.
         """
         if not class_columns(self.path, self.rows):
             return {}
@@ -163,11 +155,8 @@ class PairTable:
     def objects(self, elevations_deg: Mapping[str, Sequence[int]]) -> dict[str, list[str]]:
         """Return the ids of the objects in each category, given its elevations.
 
-        Raises
-        ------
-        UserError
-            Where the column of categories or elevations is missing, an object is missing at an
-            elevation, and as in `estimates`.
+        Raise UserError where the column of categories or elevations is missing, an object is
+        missing at an elevation, and as in `estimates`.
         """
         several = {
             "category": ("categories", len(elevations_deg)),
@@ -195,10 +184,7 @@ class PairTable:
     def check_classes(self, n_classes: int | None) -> None:
         """Check that the file has `n_classes` columns of probabilities, or none if that is None.
 
-        Raises
-        ------
-        UserError
-            Where the file has another number of them.
+        Raise UserError where the file has another number of them.
         """
         n_columns = len(class_columns(self.path, self.rows))
         if n_classes is None and n_columns:
@@ -243,21 +229,9 @@ def as_distributions(
     """Return rows (n, B) of probabilities above 0, each with the sum 1.
 
     Because no image excludes a pose, a probability of 0 is replaced by the smallest other one of
-    its row, or by `LEAST_PROBABILITY` if that is less.
-
-    Parameters
-    ----------
-    values : array-like (n, B), or (B,)
-    name : str
-        Source of the rows, for messages.
-    numbers : array-like (n,), optional
-        Numbers of the rows in messages; 1, 2, … without it.
-
-    Raises
-    ------
-    UserError
-        Where the shape is wrong, a value is not a probability, or a sum differs from 1 by more
-        than `SUM_TOLERANCE`.
+    its row, or by `LEAST_PROBABILITY` if that is less. Raise UserError where the shape is neither
+    (n, B) nor (B,), a value is not a probability, or a sum differs from 1 by more than
+    `SUM_TOLERANCE`. Messages have the `numbers` (n,) of rows, by default 1, 2, ….
     """
     try:
         given = np.asarray(values)
@@ -294,10 +268,7 @@ def as_distributions(
 def read_distributions(path: str | Path) -> NDArray[np.float64]:
     """Read distributions (n, B) of n views: CSV with columns ``p0, p1, …``, or a ``.npy`` array.
 
-    Raises
-    ------
-    UserError
-        Where the file cannot be read or a row is not a distribution.
+    Raise UserError where the file cannot be read or a row is not a distribution.
     """
     path = Path(path)
     if path.suffix.lower() == ".npy":
@@ -308,13 +279,10 @@ def read_distributions(path: str | Path) -> NDArray[np.float64]:
 def class_columns(path: Path, table: pd.DataFrame) -> list[str]:
     """Return the names of the columns of probabilities in order; empty if there are none.
 
-    Raises
-    ------
-    UserError
-        Where a column is missing between others.
+    Raise UserError where a column is missing between others.
     """
     given = [str(name) for name in table.columns]
-    similar = [name for name in given if re.fullmatch(r"\s*[pP][ _]?\d+\s*", name)]
+    similar = [name for name in given if re.fullmatch(r"p[ _]?\d+", name)]
     wanted = [f"p{number}" for number in range(len(similar))]
     if strange := sorted(set(similar) - set(wanted)):
         raise UserError(

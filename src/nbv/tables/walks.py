@@ -64,17 +64,8 @@ def walks(
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each first view, order and number of views of an instance.
 
-    Parameters
-    ----------
-    known : OrientationTable
-        Calibration: pairs of other instances.
-    images : OrientationTable
-        The images of the instance, which stands still.
-    rng : Generator
-        For orders by chance.
-    orders : mapping
-    firsts : iterable of int, optional
-        The first views; all images by default.
+    `known` are pairs of other instances, `images` those of the instance, which stands still. The
+    generator is for orders by chance; `firsts` are the first views, by default all images.
     """
     object_id, truth, score = images.object_ids[0], images.truth, images.score
     if score is not None and not np.isfinite(score).all():

@@ -115,6 +115,19 @@ def test_the_next_view_obeys_the_limits_of_its_table(rng, tmp_path, max_travel_d
         assert found == pytest.approx(cost[estimate, row.argmin()])
 
 
+def test_a_rotation_is_15_degrees_or_more_where_one_may_be(rng):
+    cost = rng.uniform(1, 2, (120, 120)).astype(np.float32)
+    cost[:, [2, 3, 117, 118]] = 0  # 6 and 9 degrees
+    rows, limits = np.full((120, 120), 1 / 120, np.float32), {"travel_cost": 0.0}
+    deltas = lookup.least_cost_delta(cost, travel_cost=0.0, max_travel_deg=180.0)
+    names = "given_estimate", "entropy", "pose_ambiguity"
+    table = LookupTable(rows, rows, cost, deltas, 8, 3, *names, **limits)
+    for estimate in range(0, 360, 30):
+        assert min(abs(rotation) for rotation, _ in ranked_rotations(table, estimate)[0]) >= 15
+        near = ranked_rotations(table, estimate, max_travel_deg=10.0)[0]
+        assert {abs(rotation) for rotation, _ in near} <= {6.0, 9.0}
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [

@@ -156,3 +156,49 @@ def test_an_impossible_symmetry_is_refused(entry, message):
 def test_what_is_no_rotation_is_named(rotations, message):
     with pytest.raises(UserError, match=message):
         as_orientations(rotations, "R")
+
+
+DIRECTION = np.array([0, 1, (1 + 5**0.5) / 2]) / np.sqrt((5 + 5**0.5) / 2)
+FINITE = {
+    3: [[0, 0, 120]],
+    12: [[0, 0, 60], [180, 0, 0]],
+    24: [[0, 0, 90], [90, 0, 0]],
+    59: [[0, 0, 360 / 59]],
+    60: [72 * DIRECTION, 120 * np.ones(3) / np.sqrt(3)],
+}
+
+
+@pytest.mark.parametrize("order", FINITE)
+@pytest.mark.parametrize("decimals", [3, 4, 6, 15])
+def test_rounded_symmetries_form_the_group_that_they_mean(order, decimals):
+    n_read = 0
+    for tilt in some(20):
+        vectors = np.array(FINITE[order]) @ tilt.T
+        rounded = np.round(bop(*vectors), decimals).tolist()
+        try:
+            as_orientations(np.reshape(rounded, (-1, 4, 4))[:, :3, :3], "R")
+        except UserError:
+            continue  # too coarse to be a rotation
+        group, n_read = Symmetry.from_bop({"symmetries_discrete": rounded}).discrete, n_read + 1
+        assert len(group) == order
+        exact = Symmetry.from_bop({"symmetries_discrete": bop(*vectors)}).discrete
+        assert np.degrees(np.arccos(ASYMMETRIC.cosine(group, exact))).min(axis=1).max() < 0.7
+    assert n_read
+
+
+def test_a_turn_that_is_no_part_of_a_whole_one_is_no_symmetry():
+    with pytest.raises(UserError, match="more than 60 rotations"):
+        Symmetry.from_bop({"symmetries_discrete": bop([0, 0, 119.5])})
+
+
+def test_one_axis_need_be_no_list():
+    (axis,) = freely([0, 2, 0])
+    assert Symmetry.from_bop({"symmetries_continuous": axis}).axis.tolist() == [0, 1, 0]
+
+
+@pytest.mark.parametrize(
+    "key", ["symmetry_discrete", "Symmetries_continuous", "symetries_discrete"]
+)
+def test_a_misspelt_key_is_named(key):
+    with pytest.raises(UserError, match=f"'{key}' is no key of BOP: give symmetries_discrete"):
+        Symmetry.from_bop({"diameter": 1, key: []})

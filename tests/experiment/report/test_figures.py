@@ -143,6 +143,8 @@ def test_figure2_shows_the_cost_of_three_rotations(inputs, drawn):
     names = [text.get_text() for text in bars.get_xticklabels()]
     assert names == ["recommended", "opposite", "worst"]
     np.testing.assert_allclose(curve.lines[0].get_ydata(), row)
+    assert bars.get_ylim() == curve.get_ylim()
+    assert np.ptp(bars.get_ylim()) < 2 * np.ptp(row)
     assert [line.get_xdata()[0] for line in curve.lines[1:]] == deltas
     for panel, name, delta in zip(axes[1:4], names, deltas, strict=True):
         azimuth = (shown.azimuth_deg + delta) % 360

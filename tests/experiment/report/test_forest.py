@@ -42,6 +42,20 @@ def test_every_claim_that_was_run_has_one_mark_by_its_verdict(judged):
         assert (mark.get_color(), mark.get_marker()) == MARKS[run.loc[claim.id, "verdict"]]
 
 
+def test_a_difference_a_hundred_times_as_large_leaves_the_others_apart_from_0(judged):
+    decided = judged["verdict"].isin(["holds", "does not hold"]) & judged["ci_low"].notna()
+    size = np.where(judged["id"] == judged["id"][decided].iloc[0], 50.0, 0.5)
+    columns = ["difference", "ci_low", "ci_high"]
+    changed = judged.assign(**{name: np.sign(judged[name]) * size for name in columns})
+    (axes,) = claims_forest(changed).axes
+    width = np.ptp(axes.transAxes.transform([[0, 0], [1, 0]])[:, 0])
+    zero = axes.transData.transform((0, 0))[0]
+    values = {float(np.asarray(mark.get_xdata())[0]) for mark in marks(axes)}
+    places = [axes.transData.transform((value, 0))[0] for value in values if value]
+    assert max(values) > 90 * min(abs(value) for value in values if value)
+    assert min(abs(place - zero) for place in places) > 0.05 * width
+
+
 def test_claims_have_short_titles_of_their_own():
     titles = [claim.title for claim in CLAIMS]
     assert len(set(titles)) == len(titles)

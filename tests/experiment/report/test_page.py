@@ -16,6 +16,7 @@ from nbv.experiment.report.page import build_report, inline_svg, svg_text
 from nbv.experiment.report.table import write_table
 from nbv.experiment.report.tables import TABLES, claims_table
 from nbv.style import INK, RC, new_figure
+from projects import ROOT
 from reports import report_files
 
 VOID = {"meta", "img", "br", "link", "hr"}
@@ -91,20 +92,22 @@ def test_it_needs_nothing_but_itself(page, html):
         assert f"drawn as {name}" in html
     for tag, attrs in page.tags:
         assert tag not in {"script", "link", "iframe", "object", "img"}
-        assert attrs.get("href", "#").startswith(("#", "data:"))
+        assert attrs.get("href", "#").startswith(("#", "data:", "../../docs/"))
     assert set(re.findall(r"url\((.)", html)) <= {"#"}
     assert "http" not in html
 
 
 def test_the_contents_lead_somewhere(page):
-    targets = [attrs["href"][1:] for tag, attrs in page.tags if tag == "a"]
-    assert targets
-    assert set(targets) <= page.ids
+    targets = [attrs["href"] for tag, attrs in page.tags if tag == "a"]
+    assert {link[1:] for link in targets if link.startswith("#")} <= page.ids
+    files = [link for link in targets if not link.startswith("#")]
+    assert files
+    assert all((ROOT / link.removeprefix("../../")).is_file() for link in files)
     assert {*TABLES, *FIGURES} <= page.ids
 
 
-def test_pictures_come_first_then_claims_tables_and_figures(html):
-    parts = ("claims", "tables", "figures", "settings", "runtime")
+def test_pictures_come_first_then_tables_claims_and_figures(html):
+    parts = ("tables", "claims", "figures", "settings", "runtime")
     places = [html.index(f'<section id="{key}">') for key in parts]
     assert places == sorted(places)
     opening = html[: places[0]]
@@ -193,7 +196,7 @@ def test_text_is_escaped(wordy, tmp_path):
 
 
 def test_claims_that_were_not_run_come_last_and_folded_away(html):
-    claims = html[html.index('<section id="claims">') : html.index('<section id="tables">')]
+    claims = html[html.index('<section id="claims">') : html.index('<section id="figures">')]
     run, absent = claims.split('<details class="absent">')
     assert 'class="badge none"' not in run
     assert 'class="badge holds"' in run
@@ -203,13 +206,20 @@ def test_claims_that_were_not_run_come_last_and_folded_away(html):
     assert f"Not run: {n_folded} of {len(CLAIMS)}" in folded
 
 
+def test_verdicts_are_counted_at_the_top_alone(html):
+    counted = r"\d+ (?:holds?|do(?:es)? not hold)\b"
+    top, rest = html.split("</header>")
+    assert re.search(counted, top)
+    assert not re.search(counted, re.sub("<details.*?</details>", "", rest, flags=re.DOTALL))
+
+
 def test_badges_differ_by_more_than_colour(html):
     badges = dict(re.findall(r'<span class="badge (\w+)">(\S) ', html))
     assert len(badges) == len(set(badges.values())) == 4
 
 
 def test_each_claim_that_was_run_has_a_picture_and_its_numbers_behind_a_fold(html):
-    claims = html[html.index('<section id="claims">') : html.index('<section id="tables">')]
+    claims = html[html.index('<section id="claims">') : html.index('<section id="figures">')]
     run = claims.split('<details class="absent">')[0]
     articles = run.split("<article")[1:]
     assert articles

@@ -315,8 +315,36 @@ def test_the_least_spread_over_folds_is_the_best(tables):
 def test_the_share_of_errors_above_90_degrees_stands_below_the_figures(tables):
     for name in ("table1", "table2", "table3", "table4", "table5"):
         labels = [row[0].text for row in tables[name].rows]
-        half = len(labels) // 2
-        assert labels[half:] == [f"{label}: errors above 90°" for label in labels[:half]]
+        shares = tables[name].cells.query("metric == 'above_90_percent'")
+        largest = shares.groupby("row_label", sort=False)["value"].max()
+        assert labels[: len(largest)] == list(largest.index)
+        above = [f"{label}: errors above 90°" for label in largest[largest > 0].index]
+        assert labels[len(largest) :] == above
+
+
+@pytest.mark.parametrize("units", [("chair",), ("chair", "mug")])
+def test_rows_without_an_error_above_90_degrees_are_one_note(evaluations, units):
+    few = {(name, 0): evaluations[name, 0] for name in units}
+    few["chair", 0] = few["chair", 0].assign(error_deg=few["chair", 0]["error_deg"].clip(upper=90))
+    table = build_table("table1", few, QUICK)
+    above = [row[0].text for row in table.rows if "above" in row[0].text]
+    assert above == [f"{name.title()}: errors above 90°" for name in units if name != "chair"]
+    (note,) = (note for note in table.notes if "above 90°" in note)
+    assert ("Chair" in note) == (len(units) > 1)
+    assert "Mug" not in note
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_the_column_in_sight_is_that_of_proposed(tables, name, evaluations):
+    table = tables[name]
+    assert table.header[table.in_sight].startswith("Proposed")
+    first_row = html_cells(table_html(table))[: len(table.header)]
+    assert re.findall('<th scope="col" class="in-sight">([^<]+)<', table_html(table)) == [
+        first_row[table.in_sight]
+    ]
+    frame = evaluations["mug", 0]
+    other = {("mug", 0): frame[frame["method"] != "proposed"]}
+    assert build_table(name, other, QUICK).in_sight is None
 
 
 def test_published_figures_are_in_brackets_and_never_bold(tables):

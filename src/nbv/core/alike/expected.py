@@ -71,10 +71,7 @@ class Expected:
         choose than at the rotation that all parts choose. The pseudo-observations take part in each
         choice. With one part it is 0.
 
-        Parameters
-        ----------
-        is_choice : ndarray (M,)
-            Which of the M rotations from the first view are admissible; one or more.
+        `is_choice` (M,) says which rotations from the first view are admissible, one or more.
         """
         n_parts = min(N_PARTS, len(self.by_object))
         if n_parts == 1:

@@ -29,14 +29,8 @@ def observed_error(
     compared with the errors of these views: by isotonic regression over `N_GROUPS` groups of first
     views, linear between the groups' means.
 
-    Parameters
-    ----------
-    views : CalibrationViews
-        After one view.
-    expected_deg : float
-        ``now_deg`` of `nbv.core.alike.expected.Expected`.
-    power, pseudo_observations, share
-        The arguments of `nbv.core.alike.expected.expected_errors`.
+    The calibration views are those after one view, and `expected_deg` is the ``now_deg`` of
+    `nbv.core.alike.expected.expected_errors`, whose arguments the others are.
     """
     of_sweep = np.ones(len(views.first)) if share is None else np.asarray(share, np.float64)
     key = power, pseudo_observations, of_sweep.tobytes()

@@ -83,15 +83,9 @@ def belief(
 ) -> OrientationBelief:
     """Return the belief after n views: V of the first estimate, times L of each further one.
 
-    Parameters
-    ----------
-    errors : OrientationErrors
-    estimates : ndarray (n, 3, 3)
-        The estimate in each view.
-    moves : ndarray (n, 3, 3)
-        Moves from the first camera to each camera; the first is the identity.
-    ratios : ndarray (n,), optional
-        Likelihood ratios of a flip, given each estimate's score; by default 1.
+    There is an estimate (n, 3, 3) in each view. Moves (n, 3, 3) are from the first camera to each;
+    the first is the identity. `ratios` (n,) are likelihood ratios of a flip, given each estimate's
+    score; by default 1.
     """
     support, votes = _support(errors, inverse(moves) @ estimates)
     ratios = np.ones(len(votes)) if ratios is None else ratios

@@ -39,7 +39,7 @@ STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Pseudo-observations that `shrinkage` compares: never none, and never so many that none count."""
 
 FIXED_STRENGTH = 10.0
-"""With too few groups for `shrinkage`; chosen on the first half (docs/decisions-protocol.md)."""
+"""With too few groups for `shrinkage`; chosen in docs/reference/rotations/protocol.md."""
 
 FEWEST_GROUPS = 4
 """Instances or scenes of all objects, from which `shrinkage` compares strengths."""

@@ -8,6 +8,7 @@ Arrays of orientations are (..., 3, 3) float64.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -25,10 +26,17 @@ Floats = NDArray[np.floating]
 MOST_ELEMENTS = 60
 """Orientations of an icosahedron, the largest finite group that is not that of a prism."""
 
+SYMMETRIES = ("symmetries_discrete", "symmetries_continuous")
+"""Keys of BOP's models_info for an object's symmetries; other keys are not about them."""
+
+NEARLY_DEG = 0.1
+"""A rotation as near to k / n turns is one by k / n turns, n up to `MOST_ELEMENTS`: any two of
+these are farther apart."""
+
 VOLUME = np.pi**2
 """Volume of SO(3); densities are per unit of it."""
 
-_SAME = 1e-5  # Difference of traces below which two elements are the same: 0.2 degrees.
+_SAME = 1e-4  # Difference of traces below which two elements are the same: 0.6 degrees.
 
 
 def inverse(orientations: Orientations) -> Orientations:
@@ -91,21 +99,23 @@ class Symmetry:
     def from_bop(cls, entry: Mapping[str, Any]) -> Symmetry:
         """Return the symmetry of an object's entry in BOP's ``models_info.json``.
 
-        An entry without ``symmetries_discrete`` and ``symmetries_continuous`` is asymmetric.
-
-        Raises
-        ------
-        UserError
-            If a symmetry is no rotation, the rotations form no group of a solid, or the object has
-            more than one axis of continuous symmetry.
+        An entry without `SYMMETRIES` is asymmetric. A discrete symmetry by nearly the n-th part of
+        a turn, such as one with three decimals, is taken to be by exactly that. Raise UserError if
+        a key is nearly one of `SYMMETRIES`, a symmetry is no rotation, the rotations form no group
+        of a solid, or the object has more than one axis of continuous symmetry.
         """
-        generators = [np.eye(3)]
+        for key in entry:
+            is_like = "sym" in key.lower() or difflib.get_close_matches(key, SYMMETRIES, 1)
+            if key not in SYMMETRIES and is_like:
+                raise UserError(f"{key!r} is no key of BOP: give {' or '.join(SYMMETRIES)}")
+        generators = []
         for matrix in entry.get("symmetries_discrete", ()):
             if np.size(matrix) != 16:
                 raise UserError("symmetries_discrete has a matrix without 16 numbers")
             corner = np.reshape(matrix, (4, 4))[:3, :3]
-            generators.append(as_orientations(corner, "a matrix of symmetries_discrete"))
+            generators.append(_n_fold(as_orientations(corner, "a matrix of symmetries_discrete")))
         axes = entry.get("symmetries_continuous", ())
+        axes = [axes] if isinstance(axes, Mapping) else axes
         if len(axes) > 1:
             raise UserError(
                 "symmetries_continuous has more than one axis: a sphere has no orientation"
@@ -244,13 +254,28 @@ def _about(axis: Array, angle_rad: Array) -> Orientations:
     )
 
 
+def _n_fold(rotation: Orientations) -> Orientations:
+    """Return the rotation (3, 3) by k / n turns that a rotation nearly is, or the same."""
+    from scipy.spatial.transform import Rotation
+
+    vector = Rotation.from_matrix(rotation).as_rotvec()
+    angle = float(np.linalg.norm(vector))
+    n = np.arange(2, MOST_ELEMENTS + 1)
+    exact = np.round(angle / (2 * np.pi) * n) / n * 2 * np.pi
+    nearest = exact[np.abs(exact - angle).argmin()]
+    if not nearest or np.abs(nearest - angle) > np.radians(NEARLY_DEG):
+        return rotation
+    snapped = _about(vector / angle, nearest)
+    # Exact ones stay the same to the last bit.
+    return rotation if np.abs(snapped - rotation).max() < 1e-12 else snapped
+
+
 def _closed(generators: Sequence[Orientations]) -> Orientations:
     """Return the group that rotations generate; the identity is first."""
-    group = [generators[0]]
-    for generator in generators[1:]:
-        queue = [generator]
-        while queue:
-            new = queue.pop()
+    group = [np.eye(3)]
+    # It grows. Products with generators alone keep the errors of rounding small.
+    for element in group:
+        for new in (element @ generator for generator in generators):
             if max(np.trace(new @ g.T) for g in group) > 3 - _SAME:
                 continue
             group.append(new)
@@ -259,5 +284,4 @@ def _closed(generators: Sequence[Orientations]) -> Orientations:
                     f"symmetries_discrete makes more than {MOST_ELEMENTS} rotations: give the axis "
                     "of a prism with so many sides in symmetries_continuous"
                 )
-            queue += [product for g in list(group) for product in (new @ g, g @ new)]
     return np.stack(group)

@@ -37,12 +37,7 @@ def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
     These are ``key=value`` pairs such as ``experiment=quick``, also with `SHORT_NAMES`, and
     ``overrides``, a list of Hydra overrides for keys that Snakemake's command line cannot spell.
     Snakemake passes on as text what YAML cannot read, such as ``[a=1,b=[2,3]]``, and cuts at every
-    comma what YAML can.
-
-    Raises
-    ------
-    UserError
-        For a value that is neither text nor a number.
+    comma what YAML can. Raise UserError for a value that is neither text nor a number.
     """
     overrides = []
     for key, value in given.items():
@@ -266,12 +261,8 @@ def _fields_of(kind: Any) -> dict[str, FieldInfo]:
 def type_of(parts: Sequence[str | int]) -> Any:
     """Return the type of a key, from its names and the indices of list items.
 
-    It is without annotations and None.
-
-    Raises
-    ------
-    UserError
-        For an unknown key: one line with the nearest key.
+    It is without annotations and None. Raise UserError for an unknown key, with the
+    nearest one.
     """
     kind: Any = Config
     for depth, part in enumerate(parts):
@@ -319,10 +310,7 @@ def shortened(value: Any) -> str:
 def one_line(mistakes: Sequence[ErrorDetails]) -> str:
     """Return the first of pydantic's mistakes as one line: key, value, and allowed values.
 
-    Raises
-    ------
-    UserError
-        For an unknown key; see `type_of`.
+    Raise UserError for an unknown key; see `type_of`.
     """
     # An unknown key first: the key that it was meant for is then missing, too.
     mistake = min(mistakes, key=lambda each: each["type"] != "extra_forbidden")

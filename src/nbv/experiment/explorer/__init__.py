@@ -20,12 +20,10 @@ from nbv.experiment.explorer.data import (
     COLUMNS,
     Outcomes,
     distributions_text,
-    methods_of,
     outcomes_of,
     outcomes_text,
     page_table,
     ring_of,
-    unit_facts,
 )
 from nbv.experiment.report.table import HTML
 from nbv.experiment.results import EvaluationFile, Unit, load_evaluations
@@ -42,27 +40,13 @@ _MOST_COARSE_BINS = 120
 
 @dataclass(frozen=True)
 class ExplorerInputs:
-    """The files and settings of the page.
+    """The files and settings of the page of a run with this name.
 
-    Attributes
-    ----------
-    name : str
-        The name of the run.
-    policies : mapping of str to str
-        The policy by method.
-    evaluations : mapping of (category, elevation_deg, fold, method) to Path
-    lookups : mapping of (category, elevation_deg, fold, criterion) to Path
-        Every fold has the same criteria.
-    min_separation_deg : float
-        Least separation of views chosen by the information gain.
-    n_views : int
-        The largest number of views.
-    depth, objects : mapping of (category, elevation_deg) to Path
-        Depth images and the ids of their objects; empty for estimates of another program.
-    posteriors : mapping of (category, elevation_deg, fold) to Path
-        Distributions of test images, if the estimator gives them.
-    caution : sequence of str
-        Warnings that precede all numbers; see `nbv.experiment.plan`.
+    Policies are by method. Every fold has lookup tables of the same criteria. Views chosen by the
+    information gain are `min_separation_deg` or more apart, and `n_views` at most. Depth images,
+    with the ids of their objects, are empty for estimates of another program; `posteriors` are by
+    category, elevation and fold, if the estimator gives distributions. `caution` (see
+    `nbv.experiment.plan`) precedes all numbers.
     """
 
     name: str
@@ -80,19 +64,17 @@ class ExplorerInputs:
 def build_explorer(inputs: ExplorerInputs) -> str:
     """Return the page of a finished run.
 
-    Raises
-    ------
-    UserError
-        If a file is missing or damaged, the objects of files differ, or no method follows a lookup
-        table.
+    Raise UserError if a file is missing or damaged, the objects of files differ, or no method
+    follows a lookup table.
     """
     if not inputs.lookups:
         raise UserError("the explorer shows lookup tables, and no method of this run follows one")
     frames = load_evaluations(inputs.evaluations)
-    methods = methods_of(frames)
+    named = (str(name) for frame in frames.values() for name in frame["method"].unique())
+    methods = tuple(dict.fromkeys(named))
     criteria = list(dict.fromkeys(criterion for *_, criterion in inputs.lookups))
     chunks: dict[str, str] = {}
-    units = []
+    units: list[dict[str, Any]] = []
     for index, (unit, frame) in enumerate(frames.items()):
         outcomes = outcomes_of(unit, frame)
         chunks[f"unit-{index}"] = outcomes_text(outcomes)
@@ -107,12 +89,25 @@ def build_explorer(inputs: ExplorerInputs) -> str:
                 "tables": tables,
                 "images": images,
                 "own": distributions,
-                **unit_facts(outcomes),
+                "objects": outcomes.object_ids,
+                "folds": outcomes.folds,
+                "views": outcomes.n_views,
+                "turns": list(outcomes.rotation),
+                "means": outcomes.means,
+                "overall": outcomes.overall,
             }
         )
     facts = {
         "run": inputs.name,
-        "methods": [_method_facts(name, methods, inputs.policies[name]) for name in methods],
+        "methods": [
+            {
+                "name": name,
+                "label": method_label(name),
+                "color": method_style(name, methods).color,
+                "criterion": policy if (policy := inputs.policies[name]) in CRITERIA else None,
+            }
+            for name in methods
+        ],
         "criteria": criteria,
         "apart": inputs.min_separation_deg,
         "mostViews": inputs.n_views,
@@ -129,16 +124,6 @@ def build_explorer(inputs: ExplorerInputs) -> str:
         most_views=inputs.n_views,
         chunks=chunks,
     )
-
-
-def _method_facts(name: str, methods: tuple[str, ...], policy: str) -> dict[str, Any]:
-    style = method_style(name, methods)
-    return {
-        "name": name,
-        "label": method_label(name),
-        "color": style.color,
-        "criterion": policy if policy in CRITERIA else None,
-    }
 
 
 def _add_tables(

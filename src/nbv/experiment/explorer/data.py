@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import io
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -223,10 +223,7 @@ class Outcomes:
 def outcomes_of(unit: Unit, frame: pd.DataFrame) -> Outcomes:
     """Return the outcomes of a frame of `nbv.experiment.results.load_evaluations`.
 
-    Raises
-    ------
-    UserError
-        Where methods have different estimates for the same view.
+    Raise UserError where methods have different estimates for the same view.
     """
     by_method = {str(name): part for name, part in frame.groupby("method", observed=True)}
     first = next(iter(by_method.values())).drop_duplicates("object_id")
@@ -291,18 +288,6 @@ def outcomes_text(outcomes: Outcomes) -> str:
     return as_text(*parts)
 
 
-def unit_facts(outcomes: Outcomes) -> dict[str, Any]:
-    """Return what the page needs in order to decode a unit's outcomes."""
-    return {
-        "objects": outcomes.object_ids,
-        "folds": outcomes.folds,
-        "views": outcomes.n_views,
-        "turns": list(outcomes.rotation),
-        "means": outcomes.means,
-        "overall": outcomes.overall,
-    }
-
-
 def _table(frame: pd.DataFrame, column: str, shape: tuple[int, int]) -> np.ndarray:
     return frame[column].to_numpy(dtype=np.float64).reshape(shape)
 
@@ -325,10 +310,3 @@ def _overall(error_deg: pd.Series) -> dict[str, float]:
 
 def _rounded(values: Iterable[float]) -> list[float]:
     return [round(float(value), 2) for value in values]
-
-
-def methods_of(frames: Mapping[Unit, pd.DataFrame]) -> tuple[str, ...]:
-    """Return the methods of all units, in their order."""
-    return tuple(
-        dict.fromkeys(str(m) for frame in frames.values() for m in frame["method"].unique())
-    )

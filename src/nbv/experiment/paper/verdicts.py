@@ -109,10 +109,8 @@ def evaluate_claims(
 def read_claims(path: str | Path) -> pd.DataFrame:
     """Read a CSV file of `evaluate_claims` for the paper's claims.
 
-    Raises
-    ------
-    UserError
-        Where the file cannot be read, or lacks a column, a claim or one of its comparisons.
+    Raise UserError where the file cannot be read, or lacks a column, a claim or one of its
+    comparisons.
     """
     frame = read_csv(path)
     check_columns(path, frame, (*CLAIM_COLUMNS, *PART_COLUMNS))

@@ -50,6 +50,7 @@ ClaimRow = Mapping[Hashable, Any]
 
 WIDTH_IN = 3.9
 _ROW_IN = 0.185
+_TICKS = (-20, -10, -5, -2, -0.5, 0, 0.5, 2, 5, 10, 20)
 _VERDICTS: Mapping[Verdict, tuple[str, str, str]] = {
     statements.HOLDS: ("Hold", FOR, "o"),
     statements.UNDECIDED: ("Undecided", OPEN, "s"),
@@ -85,6 +86,9 @@ def claims_forest(judged: pd.DataFrame) -> Figure:
     n_rows = len(claims) + len(groups)
     figure = new_figure(WIDTH_IN, _ROW_IN * n_rows + 0.6)
     axes = figure.subplots()
+    # A few differences are ten times as large as most.
+    signed_root = (lambda x: np.sign(x) * np.sqrt(np.abs(x)), lambda root: root * np.abs(root))
+    axes.set_xscale("function", functions=signed_root)
     labels: list[str] = []
     headings = []
     for verdict, members in groups.items():
@@ -100,6 +104,7 @@ def claims_forest(judged: pd.DataFrame) -> Figure:
     for text in axes.texts:
         text.set(position=(5 if right else -5, 0), ha="left" if right else "right")
     axes.axvline(0, color=INK, linewidth=0.9)
+    axes.set(xticks=_TICKS, xlim=axes.get_xlim())
     label_rows(axes, labels, headings)
     for row, (_, color, _) in zip(headings, map(_VERDICTS.__getitem__, groups), strict=True):
         axes.get_yticklabels()[row].set_color(color)

@@ -1,6 +1,7 @@
-"""The report: one HTML page with claims, tables, figures, settings and running time.
+"""The report: one HTML page with tables, claims, figures, settings and running time.
 
-It is self-contained: no scripts, no external links, figures embedded as SVG in the page's colours.
+It needs no other file: figures are embedded as SVG in the page's colours. Without scripts, it lacks
+the button that opens all claims.
 """
 
 from __future__ import annotations
@@ -28,7 +29,6 @@ from nbv.experiment.paper.statements import (
     UNDECIDED,
     VERDICT_RULES,
     VERDICTS,
-    Claim,
     Comparison,
     by_run,
 )
@@ -112,12 +112,13 @@ def _page_attribute(key: str, value: str, name: str) -> str:
 
 
 _SECTIONS = {
-    "claims": "The paper's claims",
     "tables": "Tables",
+    "claims": "The paper's claims",
     "figures": "Figures",
     "settings": "Settings",
     "runtime": "Running time",
 }
+_CLAIM = {claim.id: claim for claim in CLAIMS}
 _MAIN_CLAIM = "outperforms-all"
 _OPENING = "steps"
 _BADGES = {
@@ -155,9 +156,10 @@ def build_report(
     figures: Mapping[str, Path],
     table1: Path,
     runtime: Path,
+    docs: str,
     caution: Sequence[str] = (),
 ) -> str:
-    """Return the report of an experiment as one self-contained HTML page.
+    """Return the report of an experiment as one HTML page.
 
     Parameters
     ----------
@@ -174,6 +176,8 @@ def build_report(
         SVG files, in the order of the page.
     runtime : path
         HTML fragment of `nbv.experiment.report.runtime.runtime_table`.
+    docs : str
+        Where the folder ``docs`` lies from the page, for links.
     caution : sequence of str
         Warnings that precede all numbers; see `nbv.experiment.plan`.
 
@@ -198,11 +202,12 @@ def build_report(
             *(figure for name, figure in shown.items() if name == _OPENING),
         ],
         left_open=_left_open(settings["density"]),
+        docs=docs,
         sections=_SECTIONS,
         badges=_BADGES,
         run_facts=[*_run_facts(settings, splits), ("Commit", made_with.get("commit") or _UNKNOWN)],
-        claims_run=[_claim(claim, rows[claim.id], summary) for claim, summary in _with_claim(run)],
-        claims_not_run=[_claim(claim, {}, summary) for claim, summary in _with_claim(not_run)],
+        claims_run=[_claim(each, rows[each["id"]]) for each in run.to_dict("records")],
+        claims_not_run=[_claim(each, {}) for each in not_run.to_dict("records")],
         tally=_tally(each["verdict"]),
         point_tally=_tally(run["point_verdict"]),
         verdict_rules=VERDICT_RULES,
@@ -218,7 +223,6 @@ def build_report(
 
 def _finding(rows: Mapping[str, Mapping[Comparison, ClaimRow]], too_small: bool) -> str:
     """Return one sentence on whether the paper's conclusion holds."""
-    (claim,) = (claim for claim in CLAIMS if claim.id == _MAIN_CLAIM)
     conclusion = "The paper concludes that Proposed has a lower error than the three other methods"
     if too_small:
         return f"{conclusion}. This run is too small to judge that, whatever is said below."
@@ -227,7 +231,7 @@ def _finding(rows: Mapping[str, Mapping[Comparison, ClaimRow]], too_small: bool)
             f"{conclusion}. That is about its five categories together, which this run does not "
             "have."
         )
-    part = deciding_comparison(claim, rows[_MAIN_CLAIM])
+    part = deciding_comparison(_CLAIM[_MAIN_CLAIM], rows[_MAIN_CLAIM])
     row = rows[_MAIN_CLAIM][part]
     words = {HOLDS: "holds", FAILS: "does not hold", UNDECIDED: "is undecided"}[row["verdict"]]
     rival = str(row["versus"]).split(" (")[0]
@@ -254,25 +258,18 @@ def _opening(judged: pd.DataFrame, table1: pd.DataFrame) -> Iterator[dict[str, A
     if (judged["verdict"] != NOT_RUN).any():
         caption = (
             "The paper's claims. By how much the comparison that decides a claim favours it, with "
-            "its 95 % interval: a claim holds where all of the interval is right of 0, does not "
-            "hold where all of it is left. pAUC: 100 less the mean error, where an error above "
-            "100° counts as 100. σ: standard deviation over folds. Groups: quarters of the circle "
-            "of first views."
+            "its 95 % interval, on a square-root scale: a claim holds where all of the interval is "
+            "right of 0, does not hold where all of it is left. pAUC: 100 less the mean error, "
+            "where an error above 100° counts as 100. σ: standard deviation over folds. Groups: "
+            "quarters of the circle of first views."
         )
         drawn = svg_text(claims_forest(judged))
         yield {"name": "claims-forest", "caption": caption, "svg": inline_svg(drawn, "p2", caption)}
 
 
-def _with_claim(each: pd.DataFrame) -> Iterator[tuple[Claim, ClaimRow]]:
-    by_id = {claim.id: claim for claim in CLAIMS}
-    for row in each.to_dict("records"):
-        yield by_id[row["id"]], row
-
-
-def _claim(
-    claim: Claim, rows: Mapping[Comparison, ClaimRow], summary: ClaimRow
-) -> dict[Hashable, Any]:
+def _claim(summary: ClaimRow, rows: Mapping[Comparison, ClaimRow]) -> dict[Hashable, Any]:
     """Return the page's entry for a claim; it has no rows where the claim was not run."""
+    claim = _CLAIM[summary["id"]]
     shown: dict[Hashable, Any] = {**summary, "title": claim.title, "svg": None, "comparisons": []}
     if rows:
         label = f"{claim.title}: {summary['verdict']}. {summary['summary']}"
@@ -323,7 +320,7 @@ def _left_open(density: Mapping[str, Any]) -> str:
         )
     return (
         "The paper leaves some choices open. In Proposed, the pose likelihood of Eq. 6 is "
-        f"{given}; {smoothing}. docs/method.md gives the reasons."
+        f"{given}; {smoothing}."
     )
 
 

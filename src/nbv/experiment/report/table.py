@@ -136,6 +136,8 @@ class Table:
         Decimals of the floats in the CSV file.
     n_text_columns : int
         The number of columns of text, aligned left; the others hold numbers.
+    in_sight : int, optional
+        The index of a column that narrow pages keep in sight beside the first.
 
     Raises
     ------
@@ -152,6 +154,7 @@ class Table:
     notes: tuple[str, ...] = ()
     decimals: int = 4
     n_text_columns: int = 1
+    in_sight: int | None = None
 
     def __post_init__(self) -> None:
         for row in self.all_rows:

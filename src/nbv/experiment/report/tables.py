@@ -2,7 +2,8 @@
 
 A cell shows ``ours [published]``, the best method of a row in bold. Tables 1 to 5 close with the
 paired difference to the reference method and its interval, so that a difference can be told from
-noise without another table. Below, the same rows show the share of errors above 90°. The CSV files
+noise without another table. Below, the same rows show the share of errors above 90°; a note names
+those where it is 0 for all methods. The CSV files
 are tidy, one row per cell; see `nbv.experiment.report.settings` for the columns.
 """
 
@@ -56,6 +57,8 @@ def comparison_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
     in_blocks = cells.sort_values("metric", key=lambda names: names == ABOVE_90, kind="stable")
     for (metric, label), part in in_blocks.groupby(["metric", "row_label"], sort=False):
         title = f"{label}: errors above 90°" if metric == ABOVE_90 else str(label)
+        if metric == ABOVE_90 and not part["value"].any():
+            continue
         row = [Cell(title), *_values(part, methods)]
         if differs:
             subject = part[part["method"] == SUBJECT].iloc[0]
@@ -102,6 +105,11 @@ def comparison_notes(cells: pd.DataFrame, settings: ReportSettings) -> Iterator[
         yield f"{_counts(cells)} in each row."
     else:
         yield f"Test objects: {', '.join(f'{row} {int(n)}' for row, n in objects.items())}."
+    shares = cells[cells["metric"] == ABOVE_90].groupby("row_label", sort=False)["value"].max()
+    if (shares == 0).all():
+        yield "No error is above 90°."
+    elif (shares == 0).any():
+        yield f"Without an error above 90°: {', '.join(shares.index[shares == 0])}."
     if _shows_difference(cells, settings):
         yield (
             f"{_difference_title(settings)} is the paired difference with its 95 % interval over "
@@ -243,6 +251,7 @@ def build_table(
     made = kind.measure(name, evaluations, chosen)
     cells = pd.DataFrame(made.cells, columns=list(CELL_COLUMNS))
     header, rows = kind.body(cells, chosen)
+    subject = method_label(SUBJECT)
     return Table(
         name,
         f"Table {name.removeprefix('table')}: {made.title}",
@@ -251,6 +260,7 @@ def build_table(
         (made.row_title, *header),
         tuple(rows),
         (*made.notes, *kind.notes(cells, chosen), *published_notes(name, cells)),
+        in_sight=next((i for i, title in enumerate(header, 1) if title.startswith(subject)), None),
     )
 
 

@@ -61,23 +61,11 @@ _COUNTS = {"n_objects": "test objects", "n_images": "initial views"}
 class RunComparison:
     """The agreement of a run with a reference, and the differences.
 
-    Attributes
-    ----------
-    reference, run : pathlib.Path
-        The two folders.
-    cells : pandas.DataFrame
-        `JUDGED_COLUMNS`: one row for every figure in the cells that both have. ``quantity`` is
-        ``value``, ``difference`` or ``sigma``; ``here`` may lie between ``low`` and ``high`` (NaN
-        where it is not judged); ``status`` is ``identical`` to the last written digit, ``within``,
-        ``outside`` or ``not judged``.
-    settings : tuple of (str, object, object)
-        The configuration keys that affect results and differ: key, reference's value, run's.
-    problems : tuple of str
-        One line for each contradiction of the reference.
-    remarks : tuple of str
-        One line for every other difference.
-    n_claims : int
-        Number of claims whose verdicts were compared.
+    `cells` has the `JUDGED_COLUMNS`, and a row for every figure in the cells that both have.
+    ``quantity`` is ``value``, ``difference`` or ``sigma``; ``here`` may lie between ``low`` and
+    ``high`` (NaN where it is not judged); ``status`` is ``identical`` to the last written digit,
+    ``within``, ``outside`` or ``not judged``. `settings` affect results and differ. Each
+    contradiction of the reference is a line of `problems`, every other difference one of `remarks`.
     """
 
     reference: Path
@@ -118,11 +106,8 @@ def compare_runs(reference: Path, run: Path) -> RunComparison:
     """Compare a run's tables and claims with a reference's.
 
     The reference may be another run. The comparison is complete even where the settings differ.
-
-    Raises
-    ------
-    UserError
-        If one of the folders lacks a configuration, or the reference its tables or claims.
+    Raise UserError if one of the folders lacks a configuration, or the reference its tables or
+    claims.
     """
     known, ours = read_configuration(reference), read_configuration(run)
     factor = sigma_ratio(int(known["n_folds"]))

@@ -64,8 +64,8 @@ def job(snakemake: Any) -> Iterator[None]:
     The terminal gets warnings, errors, what is marked ``extra={"for_terminal": True}``, and of the
     progress one message a minute.
 
-    The inputs are held to their checksums before, and the outputs get theirs after. A job whose
-    run was killed ends as well.
+    The inputs are held to their checksums before, and the outputs get theirs after. A job whose run
+    was killed ends as well. Raise SystemExit with status 1, after it has reported an error.
 
     Parameters
     ----------
@@ -73,11 +73,6 @@ def job(snakemake: Any) -> Iterator[None]:
         What Snakemake gives a script. Rule and wildcards label each line, since several jobs run
         at a time. The traceback of an unexpected error goes to the log file alone. The error's one
         line goes to ``logs/last_error.txt`` too, which `why_stopped` reads.
-
-    Raises
-    ------
-    SystemExit
-        With status 1, after it has reported an error.
     """
     path = Path(snakemake.log[0])
     label = " ".join([snakemake.rule, "/".join(snakemake.wildcards)]).strip()
@@ -156,13 +151,9 @@ def check_folders(results: str) -> None:
 def begin_run(results: str) -> None:
     """Lock the folder of a run's results until this process ends, and forget the last error.
 
-    Jobs on this machine end when the lock does; see `end_with_run`. The lock's file holds where
-    the folder lies, which tells a copied run.
-
-    Raises
-    ------
-    UserError
-        If the folder cannot be written, or another run works on it.
+    Jobs on this machine end when the lock does; see `end_with_run`. The lock's file holds where the
+    folder lies, which tells a copied run. Raise UserError if the folder cannot be written, or
+    another run works on it.
     """
     logs = Path(results, "logs")
     lock, here = logs / _LOCK, str(logs.resolve())

@@ -63,12 +63,8 @@ def collect_reference(run: Path, reference: Path) -> list[Path]:
     runtime goes to the folder above the tables. ``bench.json``, which ``python -m performance``
     writes to the folder of the runs, goes to the folder of the references if it exists. Tables and
     figures of the reference that the run lacks are removed; other files stay. Returns the files
-    written, sorted.
-
-    Raises
-    ------
-    UserError
-        If the run lacks one of them; the reference then stays unchanged.
+    written, sorted. Raise UserError if the run lacks a file; the reference then stays
+    unchanged.
     """
     copies = {reference / _kept_as(source.relative_to(run)): source for source in _sources(run)}
     bench = run.parent / "bench.json"
@@ -108,11 +104,8 @@ def _kept_as(name: Path) -> Path:
 def find_reference(folder: Path, configuration: Mapping[str, Any]) -> Path:
     """Return the reference that has the name of a run, such as ``docs/reference/<name>``.
 
-    Raises
-    ------
-    UserError
-        If no reference has that name, with the names that exist; or if it was made with other
-        settings, with the settings.
+    Raise UserError if none has that name, with the names that exist, or if it was made with other
+    settings, with these.
     """
     name = str(configuration["name"])
     reference = folder / name
@@ -130,13 +123,7 @@ def find_reference(folder: Path, configuration: Mapping[str, Any]) -> Path:
 
 
 def table_files(root: Path) -> list[Path]:
-    """Return the tidy CSV of every table of cells, sorted.
-
-    Raises
-    ------
-    UserError
-        If none exists.
-    """
+    """Return the tidy CSV of every table of cells, sorted; raise UserError if none exists."""
     files = sorted(path for path in (root / "tables").glob("*.csv") if path.stem != "runtime")
     if not files:
         raise UserError(f"{root / 'tables'} holds no tables; finish the run first")
@@ -146,10 +133,7 @@ def table_files(root: Path) -> list[Path]:
 def read_cells(path: Path) -> dict[tuple[str, ...], CellRecord]:
     """Read a table's cells by `CELL_KEY`, in their order.
 
-    Raises
-    ------
-    UserError
-        If a column is missing, or there are no cells.
+    Raise UserError if a column is missing, or there are no cells.
     """
     frame = read_csv(path)
     check_columns(path, frame, CELL_COLUMNS)

@@ -60,12 +60,7 @@ def pea(errors_deg: ArrayLike, thresholds_deg: ArrayLike) -> Floats:
     even for perfect estimates. Higher is better. Do not compare methods at one threshold chosen
     after the fact; use the whole curve or the pAUC.
 
-    Parameters
-    ----------
-    errors_deg : (n_images,) float
-        Circular distances in [0, 180].
-    thresholds_deg : (...) float
-        The result has the same shape.
+    Errors (n_images,) are circular distances in [0, 180]; the result has the thresholds' shape.
     """
     ordered = np.sort(_non_empty(errors_deg))
     below = np.searchsorted(ordered, np.asarray(thresholds_deg))
@@ -93,17 +88,8 @@ def statistic_of(errors_deg: ArrayLike, name: str) -> float:
     ``above_90_percent``: the share of errors above 90 degrees, percent: front and back are
     confused. Averaging opposite estimates can split one error of 180 degrees into two of 90.
 
-    Lower is better, but for the pAUC.
-
-    Parameters
-    ----------
-    errors_deg : (n_images,) float
-        Circular distances in [0, 180].
-
-    Raises
-    ------
-    ValueError
-        If there are no errors.
+    Lower is better, but for the pAUC. Raise ValueError if there are no errors. Those (n_images,)
+    are circular distances in [0, 180].
     """
     errors = _non_empty(errors_deg)
     return float(np.median(errors) if name == "median" else np.mean(PER_IMAGE[name](errors)))

@@ -80,10 +80,7 @@ class PairedErrors:
 def pair_methods(frame: pd.DataFrame, category: str) -> PairedErrors:
     """Line up the methods of one unit (of `results.load_evaluations`) image by image.
 
-    Raises
-    ------
-    UserError
-        If the methods were not evaluated on the same images.
+    Raise UserError if the methods were not evaluated on the same images.
     """
     key = ["fold", "object_id", "initial_deg"]
     errors: dict[str, Floats] = {}
@@ -206,16 +203,13 @@ class Estimate:
 def estimate(statistic: str, sample: PairedErrors, method: str, resampler: Resampler) -> Estimate:
     """Return a statistic of one method's errors and its object resamples.
 
+    Raise ValueError if there are no images.
+
     Parameters
     ----------
     statistic : str
         ``mae`` or ``median`` (degrees), ``pauc`` or ``above_90_percent`` (percent), or
         ``mae_sigma`` and ``pauc_sigma``: the standard deviation over folds.
-
-    Raises
-    ------
-    ValueError
-        If there are no images.
     """
     errors, pooled = sample.errors_deg[method], statistic.removesuffix("_sigma")
     if pooled != statistic:

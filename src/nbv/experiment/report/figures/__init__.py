@@ -41,8 +41,8 @@ FIGURES: Mapping[str, FigureKind] = {
         choice.selection,
         "Figure 2. The criterion (the paper's: ambiguity) selects the next viewpoint: an initial "
         "view from where the category's single-view error is largest, the recommended, the "
-        "opposite and the worst next view, and the cost of each. The object has the median "
-        "single-view error of its fold.",
+        "opposite and the worst next view, and the cost of each, on an axis that does not start "
+        "at 0. The object has the median single-view error of its fold.",
         ("depth", "objects", "lookups"),
     ),
     "figure3": FigureKind(

@@ -65,7 +65,6 @@ def selection(inputs: FigureInputs) -> Figure:
     bars.bar_label(drawn, fmt="%.3f", padding=2)
     bars.set_xticks(range(3), [name for _, name in candidates])
     bars.set_xlim(-0.6, 2.6)
-    bars.set_ylim(0, max(values) * 1.18)
     bars.set_ylabel(f"{words.cost} A[e, δ] ({words.unit})")
     bars.grid(visible=False, axis="x")
     curve = figure.add_subplot(grid[1, 0])
@@ -80,6 +79,9 @@ def selection(inputs: FigureInputs) -> Figure:
             markersize=7,
             clip_on=False,
         )
+    curve.margins(y=0.2)
+    # From 0, the bars of costs that differ by a hundredth would look the same.
+    bars.set_ylim(curve.get_ylim())
     azimuth_axis(curve, "Rotation δ (degrees)")
     curve.set_ylabel(f"A[e, δ] ({words.unit})")
     figure.suptitle(f"{words.selects} selects the next view: {shown.title}", fontsize=10)

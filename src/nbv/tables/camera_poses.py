@@ -1,0 +1,89 @@
+"""Camera poses of several views that contradict the places where they see the object."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+
+from nbv.core.orientations.group import Array, Orientations, Symmetry, inverse
+from nbv.errors import UserError
+
+TOLD, AGREEING = 0.2, 0.05
+"""Shares of the viewing distance: by more, views contradict each other; within, they agree."""
+
+TURNED_DEG = 20.0
+"""Orientations in the base frame that differ by more contradict each other, unless one is a flip;
+those by less than half agree."""
+
+OPTICAL = "+z forward, +y down"
+AXES = {OPTICAL: "", "-z forward, -y down": "OpenGL's", "+x forward, -z down": "a ROS body's"}
+"""Likely axes of a camera, and what they are called."""
+
+INVERTED = "inverted (base to camera)"
+WAYS = ("", INVERTED, "with transposed rotations")
+UNITS = {"": 1.0, "in millimetres": 1e-3}
+HANDS = {"": 1.0, "left-handed (Unity's)": -1.0}
+
+
+def contradictions(
+    poses: Array, seen_m: Array, orientations: Orientations, symmetry: Symmetry
+) -> list[str]:
+    """Return a warning where views contradict each other in the base frame.
+
+    Poses (n, 4, 4) are camera to base; `seen_m` (n, 3) and `orientations` (n, 3, 3) are of the
+    object in each camera. Where the object is seen tells most mistakes. A mirrored frame moves an
+    object on the optical axis little, but turns it. Where poses of another convention would agree,
+    a UserError names it.
+    """
+    distance_m = np.linalg.norm(seen_m, axis=1).mean()
+
+    def apart(rotation: Orientations, origin: Array) -> tuple[Array, float]:
+        places = (rotation @ seen_m[:, :, None])[..., 0] + origin
+        seen = rotation @ orientations
+        share = np.linalg.norm(places - places[0], axis=1) / distance_m
+        return share, float(symmetry.distance_deg(seen, seen[0]).max())
+
+    share, apart_deg = apart(poses[:, :3, :3], poses[:, :3, 3])
+    most, is_told = float(share.max()), bool(share.max() > TOLD)
+    if not is_told and (most <= AGREEING or apart_deg <= TURNED_DEG):
+        return []
+    what = (
+        f"views 0 and {share.argmax()} place the object {most * distance_m:.2f} m apart in the "
+        f"base frame, {most:.0%} of the viewing distance"
+    )
+    for name, rotation, origin in _conventions(poses):
+        other, other_deg = apart(rotation, origin)
+        agree = (
+            f"{what}; they agree if camera poses are {name}: give those of the optical frame "
+            "(z forward, y down), camera to base, in metres"
+        )
+        if is_told and other.max() <= AGREEING:
+            raise UserError(agree)
+        if other.max() <= most / 3 and other_deg <= TURNED_DEG / 2:
+            return [agree]
+    return [f"{what}: do they see the same instance, and are the camera poses right?"] * is_told
+
+
+def _conventions(poses: Array) -> Iterator[tuple[str, Orientations, Array]]:
+    """Yield what poses may be by mistake, likely mistakes first, and then the right ones."""
+    from scipy.spatial.transform import Rotation
+
+    turns = {}
+    for matrix in Rotation.create_group("O").as_matrix().round():
+        down, forward = ("+-"[int(v.sum() < 0)] + "xyz"[np.abs(v).argmax()] for v in matrix.T[1:])
+        turns[f"{forward} forward, {down} down"] = matrix
+    tried = sorted(
+        product(WAYS, UNITS, HANDS, turns),
+        key=lambda each: sum(map(bool, each[:3])) + (each[3] != OPTICAL) + (each[3] not in AXES),
+    )
+    for way, unit, hand, axes in tried[1:]:
+        mirror = np.diag([1, HANDS[hand], 1])
+        rotation = mirror @ poses[:, :3, :3] @ mirror
+        origin = UNITS[unit] * poses[:, :3, 3] @ mirror
+        rotation = inverse(rotation) if way else rotation
+        origin = -(rotation @ origin[:, :, None])[..., 0] if way == INVERTED else origin
+        of_axes = "" if axes == OPTICAL else f"{AXES.get(axes, 'of other axes')} ({axes})"
+        names = [name for name in (way, unit, hand, of_axes) if name]
+        yield " and ".join(names), rotation @ turns[axes], origin
