@@ -32,9 +32,10 @@ _LARGEST_16_BIT = 65535
 # Renderers write 1e10 where there is no surface.
 _NO_DEPTH = 1e9
 # A label fills a square of this side, pixels, and labels this share of the mask. Soft edges are
-# narrower, and take less.
+# narrower, and take less. Labels may have a thin ring of one value, with this share of the mask.
 _REGION = 5
 _LABELLED = 0.75
+_RING = 0.01
 # Kind, columns, rows and the largest value, possibly with comments between them.
 _PGM_HEADER = re.compile(rb"P[25]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)")
 
@@ -170,14 +171,26 @@ def without_single_axes(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _check_one_label(values: NDArray[Any], inside: NDArray[np.bool_], name: str) -> None:
-    """Raise UserError if several values each fill a region, as labels do and soft edges do not."""
+    """Raise UserError if values are labels: several fill a region, or one other is around them.
+
+    Soft edges have many values, and none of them fills a region.
+    """
     shown = values[inside]
     if not shown.size or shown.min() == shown.max():
         return
     is_even = ndimage.minimum_filter(values, _REGION) == ndimage.maximum_filter(values, _REGION)
     labels = np.unique(values[inside & is_even])
-    if len(labels) < 2 or np.isin(shown, labels).mean() < _LABELLED:
+    labelled = np.isin(shown, labels).mean()
+    others = np.setdiff1d(shown, labels)
+    has_ring = len(labels) > 0 and len(others) == 1 and labelled <= 1 - _RING
+    if not has_ring and (len(labels) < 2 or labelled < _LABELLED):
         return
+    if inside.all() and len(others) > 1:
+        raise UserError(
+            f"{name} has values from {shown.min():.9g} to {shown.max():.9g} and no 0: threshold it "
+            f"first, as in mask > {np.mean(labels[[0, -1]]):.0f}"
+        )
+    labels = np.append(labels, others) if has_ring else labels
     listed = [f"{label:.9g} ({np.count_nonzero(shown == label)} pixels)" for label in labels[:4]]
     raise UserError(
         f"{name}: which value is the object? {', '.join(listed)}{' …' * (len(labels) > 4)}: give "
