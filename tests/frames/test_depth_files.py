@@ -492,5 +492,8 @@ def test_an_alpha_channel_that_varies_is_the_mask(tmp_path, rng):
                 read_mask(path)
         else:
             assert np.array_equal(read_mask(path), MANY > 0), name
+    matte = ndimage.gaussian_filter(255.0 * ONE, 2).astype(np.uint8)
+    soft = image(tmp_path / "a.png", np.dstack([matte, matte, matte, matte]))
+    assert np.array_equal(read_mask(soft), matte > 127)
     opaque = np.dstack([np.repeat(255 * ONE[..., None], 3, axis=2), np.full((40, 60), 255)])
     assert np.array_equal(read_mask(image(tmp_path / "a.png", opaque.astype(np.uint8))), ONE)

@@ -100,7 +100,8 @@ def write_depth(path: Path, depth_m: DepthImage) -> None:
 def read_mask(path: str | Path, mask_value: float | None = None) -> NDArray[np.bool_]:
     """Read the mask (rows, columns) of one object; see `as_mask` for `mask_value` and errors.
 
-    From several arrays in an ``.npz`` it reads ``mask``. An alpha channel that varies is the mask.
+    From several arrays in an ``.npz`` it reads ``mask``. An alpha channel that varies is the mask,
+    above a half of its largest value.
     A value of a palette is an index, and a colour is 65536 R + 256 G + B.
     """
     values = _read_array(as_path(path), "mask")
@@ -214,7 +215,7 @@ def _labels_of_colours(
             f"{name}: its alpha channel and its colours are two masks: which is the object's? save "
             "that one as a grey image"
         )
-    return (opacity > 0).astype(np.int32)
+    return np.asarray(opacity > opacity.max() / 2, dtype=np.int32)
 
 
 def to_metres(
