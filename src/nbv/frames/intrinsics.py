@@ -31,6 +31,8 @@ _DISTORTION = re.compile(
 # Scales of images to others, and how far a principal point may be off the centre of such an image.
 _SCALES = (0.25, 1 / 3, 0.5, 2 / 3, 1.5, 2.0, 3.0, 4.0)
 _USUAL_SCALE = 0.1
+# Scales along one axis: 1280 × 720 and 848 × 480 pixels have another shape than 640 × 480.
+_SCALES_OF_AXES = (*_SCALES, 0.75, 0.8, 1.0, 1.25, 4 / 3)
 
 # Of numbers in the right order, how far the principal point is off the centre, as a share of the
 # side, and the relative difference of the focal lengths.
@@ -116,20 +118,23 @@ class Intrinsics:
         if not known and self.cx is not None:
             self._check_order(rows, columns)
         for name, value, size in (("cx", self.cx, columns), ("cy", self.cy, rows)):
-            if value is not None and not -0.5 * size <= value <= 1.5 * size:
+            if value is not None and not (-0.5 * size if known else 0) < value <= 1.5 * size:
                 raise FrameError(
                     "other-resolution",
-                    f"the principal point {name}={value:g} is far outside a frame of {columns} × "
+                    f"the principal point {name}={value:g} is not in a frame of {columns} × "
                     f"{rows} pixels: give the intrinsics of this resolution; for a frame cut out "
-                    "of a larger one, only the focal length",
+                    "of a larger one, only the focal length, or also its own width and height",
                 )
         if known or self.cx is None or self.cy is None:
             return
         # A cut-out frame is unlikely to have the same scale in both directions, or a usual one.
-        scale, other = (2 * self.cx + 1) / columns, (2 * self.cy + 1) / rows
+        scale, other = scales = (2 * self.cx + 1) / columns, (2 * self.cy + 1) / rows
         is_whole = scale > _LEAST_SCALE and abs(scale - other) < _SAME_SCALE * scale
         is_usual = any(max(abs(scale / s - 1), abs(other / s - 1)) < _USUAL_SCALE for s in _SCALES)
-        if is_usual or (is_whole and abs(scale - 1) > OFF_CENTRE):
+        is_of_axes = max(abs(s - 1) for s in scales) > _SAME_SCALE and all(
+            min(abs(s / usual - 1) for usual in _SCALES_OF_AXES) < _SAME_SCALE for s in scales
+        )
+        if is_usual or is_of_axes or (is_whole and abs(scale - 1) > OFF_CENTRE):
             raise FrameError(
                 "other-resolution",
                 f"the principal point ({self.cx:g}, {self.cy:g}) is the centre of an image of "
@@ -146,7 +151,11 @@ class Intrinsics:
             return off < _CENTRAL and abs(fx - fy) < _SQUARE * fy
 
         a, b, c, d = given = self.fx, self.fy, self.cx or 0.0, self.cy or 0.0
-        for order, numbers in (("fx,cx,fy,cy", (a, c, b, d)), ("cx,cy,fx,fy", (c, d, a, b))):
+        for order, numbers in (
+            ("fx,cx,fy,cy", (a, c, b, d)),
+            ("cx,cy,fx,fy", (c, d, a, b)),
+            ("fx,fy,cy,cx", (a, b, d, c)),
+        ):
             if fits(*numbers) and not fits(*given):
                 raise FrameError(
                     "other-resolution",
