@@ -96,6 +96,14 @@ def test_every_camera_file_gives_the_same_camera(tmp_path, name):
         assert camera_of(str(tmp_path / name)).intrinsics == wanted
 
 
+@pytest.mark.parametrize(("name", "form"), [("cam_K.txt", "%.18e"), ("K.txt", "%g"), ("K", "%.2f")])
+def test_a_matrix_alone_may_be_a_file(tmp_path, name, form):
+    np.savetxt(tmp_path / name, np.reshape(K, (3, 3)), form)
+    np.save(tmp_path / "K.npy", np.reshape(K, (3, 3)))
+    assert camera_of(str(tmp_path / name)) == camera_of(str(tmp_path / "K.npy"))
+    assert camera_of(str(tmp_path / name)).intrinsics == WANTED
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [

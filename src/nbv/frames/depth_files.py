@@ -100,9 +100,8 @@ def write_depth(path: Path, depth_m: DepthImage) -> None:
 def read_mask(path: str | Path, mask_value: float | None = None) -> NDArray[np.bool_]:
     """Read the mask (rows, columns) of one object; see `as_mask` for `mask_value` and errors.
 
-    From several arrays in an ``.npz`` it reads ``mask``. An alpha channel that varies is the mask,
-    above a half of its largest value.
-    A value of a palette is an index, and a colour is 65536 R + 256 G + B.
+    From several arrays in an ``.npz`` it reads ``mask``. An alpha channel that varies is the mask
+    above half its maximum. A value of a palette is an index, and a colour is 65536 R + 256 G + B.
     """
     values = _read_array(as_path(path), "mask")
     if values.ndim == 3 and as_path(path).suffix.lower() in IMAGES:
@@ -115,8 +114,8 @@ def as_mask(
 ) -> NDArray[np.bool_]:
     """Return the mask (rows, columns) of one object.
 
-    Raise UserError where values are negative or no numbers, masks differ, several values each fill
-    a region, or none is `mask_value`.
+    Raise UserError where values are negative or no numbers, masks differ, values are labels or soft
+    without a 0, or none is `mask_value`.
 
     Parameters
     ----------
@@ -172,17 +171,13 @@ def without_single_axes(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _check_one_label(values: NDArray[Any], inside: NDArray[np.bool_], name: str) -> None:
-    """Raise UserError if values are labels: several fill a region, or one other is around them.
-
-    Soft edges have many values, and none of them fills a region.
-    """
+    """Raise UserError unless values but one are soft edges: many, and none fills a region."""
     shown = values[inside]
     if not shown.size or shown.min() == shown.max():
         return
     is_even = ndimage.minimum_filter(values, _REGION) == ndimage.maximum_filter(values, _REGION)
     labels = np.unique(values[inside & is_even])
-    labelled = np.isin(shown, labels).mean()
-    others = np.setdiff1d(shown, labels)
+    labelled, others = np.isin(shown, labels).mean(), np.setdiff1d(shown, labels)
     has_ring = len(labels) > 0 and len(others) == 1 and labelled <= 1 - _RING
     if not has_ring and (len(labels) < 2 or labelled < _LABELLED):
         return

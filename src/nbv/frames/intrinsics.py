@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nbv.errors import FrameError, UserError, check_number, reason_of
-from nbv.files import missing, read_text
+from nbv.files import missing, read_numbers, read_text
 from nbv.frames.depth_files import MILLIMETRE
 
 OFF_CENTRE = 0.2
@@ -121,7 +121,7 @@ class Intrinsics:
             if value is not None and not (-0.5 * size if known else 0) < value <= 1.5 * size:
                 raise FrameError(
                     "other-resolution",
-                    f"the principal point {name}={value:g} is not in a frame of {columns} × "
+                    f"the principal point {name}={value:g} cannot be that of {columns} × "
                     f"{rows} pixels: give the intrinsics of this resolution; for a frame cut out "
                     "of a larger one, only the focal length, or also its own width and height",
                 )
@@ -233,6 +233,7 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     ``cam_K``, each with or without ``depth_scale``; BOP's ``scene_camera.json``, with a camera for
     each image; ROS's ``CameraInfo`` (``k`` or ``K``); Open3D's ``intrinsic_matrix``; or
     ``camera_matrix`` of ROS or of OpenCV's ``FileStorage``, with its numbers in ``data`` or nested.
+    A text or an ``.npy`` file of numbers alone is a 3 × 3 matrix, or fx fy cx cy.
     Raise UserError where the text has none of these forms, or the file has no camera for the frame.
 
     Parameters
@@ -245,11 +246,8 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     """
     if text is None:
         return DepthCamera()
-    parts = text.replace(",", " ").split()
-    try:
-        return DepthCamera(as_intrinsics([float(part) for part in parts]))
-    except ValueError:
-        pass
+    if (numbers := _numbers_in(text)) is not None:
+        return DepthCamera(as_intrinsics(numbers))
     path = Path(text)
     try:
         if not path.is_file():
@@ -260,6 +258,14 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
         raise
     except Exception as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
+
+
+def _numbers_in(text: str) -> list[float] | None:
+    """Return the numbers of a text that holds nothing else, else None."""
+    try:
+        return [float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        return None
 
 
 def _what_is_missing(path: Path) -> str:
@@ -293,7 +299,11 @@ def _image_entry(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[
 
 
 def _read_mapping(path: Path) -> Mapping[str, Any]:
+    if path.suffix.lower() == ".npy":
+        return {"K": read_numbers(path)}
     text = read_text(path)
+    if (numbers := _numbers_in(text)) and len(numbers) > 1:
+        return {"K": numbers}
     if path.suffix.lower() == ".json":
         values = json.loads(text)
     else:
