@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 # Messages of libraries about a file, and what they mean for its author; `{…}` is a group.
 _REASONS = (
-    ("Object arrays cannot.*", "it holds Python objects (pickled); save an array of numbers"),
+    (".*(Object a|objects in).*", "it holds Python objects (pickled); save an array of numbers"),
     # numpy takes any other content for pickled objects, and advises to load them unsafely.
     (".*allow_pickle.*", "it is not an array of numbers"),
     ("File is not a zip file", "it is not an .npz file, or only a part of one"),

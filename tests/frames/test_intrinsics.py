@@ -96,6 +96,14 @@ def test_every_camera_file_gives_the_same_camera(tmp_path, name):
         assert camera_of(str(tmp_path / name)).intrinsics == wanted
 
 
+@pytest.mark.parametrize(("name", "form"), [("cam_K.txt", "%.18e"), ("K.txt", "%g"), ("K", "%.2f")])
+def test_a_matrix_alone_may_be_a_file(tmp_path, name, form):
+    np.savetxt(tmp_path / name, np.reshape(K, (3, 3)), form)
+    np.save(tmp_path / "K.npy", np.reshape(K, (3, 3)))
+    assert camera_of(str(tmp_path / name)) == camera_of(str(tmp_path / "K.npy"))
+    assert camera_of(str(tmp_path / name)).intrinsics == WANTED
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
@@ -340,7 +348,7 @@ def test_a_principal_point_off_the_middle_is_doubted():
         assert "cut out" in doubt
 
 
-@pytest.mark.parametrize("order", [(0, 2, 1, 3), (2, 3, 0, 1)])
+@pytest.mark.parametrize("order", [(0, 2, 1, 3), (2, 3, 0, 1), (0, 1, 3, 2)])
 @given(
     f=st.floats(200, 1500),
     off=st.floats(-0.05, 0.05),
@@ -368,6 +376,20 @@ def test_a_principal_point_near_the_centre_of_a_usual_scale_is_refused(scale, x,
     with pytest.raises(FrameError, match="the centre of an image") as error:
         camera.check_resolution(480, 640)
     assert error.value.name == "other-resolution"
+
+
+@pytest.mark.parametrize(
+    ("cx", "cy"),
+    [
+        *((644.2, 361.4), (638, 367), (424.3, 238.7), (212.1, 119.4), (322, 181), (255.5, 191.5)),
+        *((0, 0), (0, 239.5), (-319.5, 239.5), (319.5, -1)),
+    ],
+)
+def test_a_principal_point_of_another_shape_or_not_above_0_is_refused(cx, cy):
+    """1280 × 720, 848 × 480, 424 × 240, 640 × 360 and 512 × 384 pixels; their own size is right."""
+    with pytest.raises(FrameError, match=r"the principal point .* its own width and height"):
+        Intrinsics(600.0, 600.0, cx, cy).check_resolution(480, 640)
+    Intrinsics(600.0, 600.0, cx, cy, 640, 480).check_resolution(480, 640)
 
 
 INFO = {"width": 640, "height": 480, "k": K}

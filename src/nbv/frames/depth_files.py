@@ -32,9 +32,10 @@ _LARGEST_16_BIT = 65535
 # Renderers write 1e10 where there is no surface.
 _NO_DEPTH = 1e9
 # A label fills a square of this side, pixels, and labels this share of the mask. Soft edges are
-# narrower, and take less.
+# narrower, and take less. Labels may have a thin ring of one value, with this share of the mask.
 _REGION = 5
 _LABELLED = 0.75
+_RING = 0.01
 # Kind, columns, rows and the largest value, possibly with comments between them.
 _PGM_HEADER = re.compile(rb"P[25]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)")
 
@@ -99,8 +100,8 @@ def write_depth(path: Path, depth_m: DepthImage) -> None:
 def read_mask(path: str | Path, mask_value: float | None = None) -> NDArray[np.bool_]:
     """Read the mask (rows, columns) of one object; see `as_mask` for `mask_value` and errors.
 
-    From several arrays in an ``.npz`` it reads ``mask``. An alpha channel that varies is the mask.
-    A value of a palette is an index, and a colour is 65536 R + 256 G + B.
+    From several arrays in an ``.npz`` it reads ``mask``. An alpha channel that varies is the mask
+    above half its maximum. A value of a palette is an index, and a colour is 65536 R + 256 G + B.
     """
     values = _read_array(as_path(path), "mask")
     if values.ndim == 3 and as_path(path).suffix.lower() in IMAGES:
@@ -113,8 +114,8 @@ def as_mask(
 ) -> NDArray[np.bool_]:
     """Return the mask (rows, columns) of one object.
 
-    Raise UserError where values are negative or no numbers, masks differ, several values each fill
-    a region, or none is `mask_value`.
+    Raise UserError where values are negative or no numbers, masks differ, values are labels or soft
+    without a 0, or none is `mask_value`.
 
     Parameters
     ----------
@@ -170,14 +171,22 @@ def without_single_axes(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _check_one_label(values: NDArray[Any], inside: NDArray[np.bool_], name: str) -> None:
-    """Raise UserError if several values each fill a region, as labels do and soft edges do not."""
+    """Raise UserError unless values but one are soft edges: many, and none fills a region."""
     shown = values[inside]
     if not shown.size or shown.min() == shown.max():
         return
     is_even = ndimage.minimum_filter(values, _REGION) == ndimage.maximum_filter(values, _REGION)
     labels = np.unique(values[inside & is_even])
-    if len(labels) < 2 or np.isin(shown, labels).mean() < _LABELLED:
+    labelled, others = np.isin(shown, labels).mean(), np.setdiff1d(shown, labels)
+    has_ring = len(labels) > 0 and len(others) == 1 and labelled <= 1 - _RING
+    if not has_ring and (len(labels) < 2 or labelled < _LABELLED):
         return
+    if inside.all() and len(others) > 1:
+        raise UserError(
+            f"{name} has values from {shown.min():.9g} to {shown.max():.9g} and no 0: threshold it "
+            f"first, as in mask > {np.mean(labels[[0, -1]]):.0f}"
+        )
+    labels = np.append(labels, others) if has_ring else labels
     listed = [f"{label:.9g} ({np.count_nonzero(shown == label)} pixels)" for label in labels[:4]]
     raise UserError(
         f"{name}: which value is the object? {', '.join(listed)}{' …' * (len(labels) > 4)}: give "
@@ -201,7 +210,7 @@ def _labels_of_colours(
             f"{name}: its alpha channel and its colours are two masks: which is the object's? save "
             "that one as a grey image"
         )
-    return (opacity > 0).astype(np.int32)
+    return np.asarray(opacity > opacity.max() / 2, dtype=np.int32)
 
 
 def to_metres(

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nbv.errors import FrameError, UserError, check_number, reason_of
-from nbv.files import missing, read_text
+from nbv.files import missing, read_numbers, read_text
 from nbv.frames.depth_files import MILLIMETRE
 
 OFF_CENTRE = 0.2
@@ -31,6 +31,8 @@ _DISTORTION = re.compile(
 # Scales of images to others, and how far a principal point may be off the centre of such an image.
 _SCALES = (0.25, 1 / 3, 0.5, 2 / 3, 1.5, 2.0, 3.0, 4.0)
 _USUAL_SCALE = 0.1
+# Scales along one axis: 1280 × 720 and 848 × 480 pixels have another shape than 640 × 480.
+_SCALES_OF_AXES = (*_SCALES, 0.75, 0.8, 1.0, 1.25, 4 / 3)
 
 # Of numbers in the right order, how far the principal point is off the centre, as a share of the
 # side, and the relative difference of the focal lengths.
@@ -116,20 +118,23 @@ class Intrinsics:
         if not known and self.cx is not None:
             self._check_order(rows, columns)
         for name, value, size in (("cx", self.cx, columns), ("cy", self.cy, rows)):
-            if value is not None and not -0.5 * size <= value <= 1.5 * size:
+            if value is not None and not (-0.5 * size if known else 0) < value <= 1.5 * size:
                 raise FrameError(
                     "other-resolution",
-                    f"the principal point {name}={value:g} is far outside a frame of {columns} × "
+                    f"the principal point {name}={value:g} cannot be that of {columns} × "
                     f"{rows} pixels: give the intrinsics of this resolution; for a frame cut out "
-                    "of a larger one, only the focal length",
+                    "of a larger one, only the focal length, or also its own width and height",
                 )
         if known or self.cx is None or self.cy is None:
             return
         # A cut-out frame is unlikely to have the same scale in both directions, or a usual one.
-        scale, other = (2 * self.cx + 1) / columns, (2 * self.cy + 1) / rows
+        scale, other = scales = (2 * self.cx + 1) / columns, (2 * self.cy + 1) / rows
         is_whole = scale > _LEAST_SCALE and abs(scale - other) < _SAME_SCALE * scale
         is_usual = any(max(abs(scale / s - 1), abs(other / s - 1)) < _USUAL_SCALE for s in _SCALES)
-        if is_usual or (is_whole and abs(scale - 1) > OFF_CENTRE):
+        is_of_axes = max(abs(s - 1) for s in scales) > _SAME_SCALE and all(
+            min(abs(s / usual - 1) for usual in _SCALES_OF_AXES) < _SAME_SCALE for s in scales
+        )
+        if is_usual or is_of_axes or (is_whole and abs(scale - 1) > OFF_CENTRE):
             raise FrameError(
                 "other-resolution",
                 f"the principal point ({self.cx:g}, {self.cy:g}) is the centre of an image of "
@@ -146,7 +151,11 @@ class Intrinsics:
             return off < _CENTRAL and abs(fx - fy) < _SQUARE * fy
 
         a, b, c, d = given = self.fx, self.fy, self.cx or 0.0, self.cy or 0.0
-        for order, numbers in (("fx,cx,fy,cy", (a, c, b, d)), ("cx,cy,fx,fy", (c, d, a, b))):
+        for order, numbers in (
+            ("fx,cx,fy,cy", (a, c, b, d)),
+            ("cx,cy,fx,fy", (c, d, a, b)),
+            ("fx,fy,cy,cx", (a, b, d, c)),
+        ):
             if fits(*numbers) and not fits(*given):
                 raise FrameError(
                     "other-resolution",
@@ -224,6 +233,7 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     ``cam_K``, each with or without ``depth_scale``; BOP's ``scene_camera.json``, with a camera for
     each image; ROS's ``CameraInfo`` (``k`` or ``K``); Open3D's ``intrinsic_matrix``; or
     ``camera_matrix`` of ROS or of OpenCV's ``FileStorage``, with its numbers in ``data`` or nested.
+    A text or an ``.npy`` file of numbers alone is a 3 × 3 matrix, or fx fy cx cy.
     Raise UserError where the text has none of these forms, or the file has no camera for the frame.
 
     Parameters
@@ -236,11 +246,8 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     """
     if text is None:
         return DepthCamera()
-    parts = text.replace(",", " ").split()
-    try:
-        return DepthCamera(as_intrinsics([float(part) for part in parts]))
-    except ValueError:
-        pass
+    if (numbers := _numbers_in(text)) is not None:
+        return DepthCamera(as_intrinsics(numbers))
     path = Path(text)
     try:
         if not path.is_file():
@@ -251,6 +258,14 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
         raise
     except Exception as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
+
+
+def _numbers_in(text: str) -> list[float] | None:
+    """Return the numbers of a text that holds nothing else, else None."""
+    try:
+        return [float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        return None
 
 
 def _what_is_missing(path: Path) -> str:
@@ -284,7 +299,11 @@ def _image_entry(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[
 
 
 def _read_mapping(path: Path) -> Mapping[str, Any]:
+    if path.suffix.lower() == ".npy":
+        return {"K": read_numbers(path)}
     text = read_text(path)
+    if (numbers := _numbers_in(text)) and len(numbers) > 1:
+        return {"K": numbers}
     if path.suffix.lower() == ".json":
         values = json.loads(text)
     else:
