@@ -293,7 +293,7 @@ def recommend_camera(
         in_base=in_base,
         warnings=tuple(warnings),
         helps=bool(cost[ranked[0]] < HELPFUL * now.error_deg),
-        no_flips=not errors.is_flip.any(),
+        no_flips=not errors.is_flip.any() and len(set(now.votes.tolist())) == 1,
     )
 
 
