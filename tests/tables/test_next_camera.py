@@ -117,6 +117,38 @@ def test_a_camera_far_from_the_base_is_told(flipping):
         assert any("millimetres" in text for text in answer.warnings) == (metres > 50)
 
 
+@pytest.mark.parametrize("table_of", ["table", "flipping"])
+def test_estimates_that_contradict_each_other_are_never_enough(request, table_of):
+    made = request.getfixturevalue(table_of)
+    if table_of == "flipping":
+        made = replace(made, estimate=made.truth)
+    views, flip = [turned(0), turned(100)], Rotation.from_euler("x", 180, degrees=True).as_matrix()
+    for given in (views, [PoseEstimate(np.eye(3))]):
+        assert made.recommend(given, 20).decision.verdict == "enough"
+        last = given[-1]
+        other = replace(last, rotation=last.rotation @ flip)
+        answer = made.recommend([*given[: len(given) - 1 or 1], other], 20)
+        assert answer.decision.verdict != "enough"
+
+
+@pytest.mark.parametrize("score", [np.nan, np.inf, "high", [0.4, 0.5]])
+def test_a_score_is_a_finite_number(score):
+    with pytest.raises(UserError, match="score is not a finite number"):
+        PoseEstimate(np.eye(3), score=score)
+
+
+def test_what_is_no_list_of_estimates_is_named(table):
+    view = PoseEstimate(np.eye(3))
+    for given in (view, [np.eye(4)], np.eye(4)):
+        with pytest.raises(UserError, match="`estimates`: give a list of PoseEstimate"):
+            table.recommend(given, 9)
+    with pytest.raises(UserError, match="`candidates`=9: give camera poses, or an integer"):
+        table.recommend([view], 9.0)
+    named = replace(table, object_id=np.full(20, "1"), symmetries={})
+    wanted = named.recommend([view], 9, object_id="1")
+    assert named.recommend([view], np.int64(9), object_id=1).decision == wanted.decision
+
+
 # Candidates
 
 

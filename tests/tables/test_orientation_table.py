@@ -301,7 +301,7 @@ def test_where_flips_do_not_depend_on_the_view_candidates_are_ranked_by_travel()
     # One further view cannot say which of two is flipped.
     assert answer.decision.verdict == "no view helps"
     assert answer.moves[0].target_camera_pose is None
-    with pytest.raises(UserError, match="2 objects"):
+    with pytest.raises(UserError, match="2 objects; give `object_id`"):
         pairs.recommend([PoseEstimate(np.eye(3))], 20)
 
 

@@ -107,7 +107,7 @@ SHIPPED = "mug"
 
 def flag(name: str) -> str:
     """Return the flag of a field of options, or of a library's parameter."""
-    return "--" + re.sub("_(deg|mm?)$", "", name).replace("_", "-")
+    return "--" + re.sub("_(deg|mm?|id)$", "", name).replace("_", "-")
 
 
 def in_flags(message: str) -> str:

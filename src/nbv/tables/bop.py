@@ -177,7 +177,7 @@ def groups_of(rows: pd.DataFrame) -> NDArray[np.str_]:
 
 def _with_keys(path: Path, rows: pd.DataFrame) -> pd.DataFrame:
     for key in KEYS:
-        numbers = column(path, rows, key)
+        numbers = column(path, rows, key, limit=9e18)
         if (is_part := numbers % 1 != 0).any():
             row = rows.index[is_part.argmax()]
             raise UserError(f"{path}, row {row + 2}: {key} {rows[key][row]} is no integer")

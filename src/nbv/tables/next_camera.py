@@ -75,7 +75,7 @@ class PoseEstimate:
     Raises
     ------
     UserError
-        If a pose is none, or the camera cannot see the object there.
+        If a pose is none, the camera cannot see the object there, or the score is no finite number.
 
     Examples
     --------
@@ -102,6 +102,7 @@ class PoseEstimate:
             camera = as_given(self.camera_pose, "camera pose")
         for name, value in {
             "rotation": pose.rotation,
+            "score": None if self.score is None else as_finite(self.score, "score", 1).item(),
             "position_mm": pose.position_mm if position is None else as_position(position, "t"),
             "camera_pose": camera and camera.camera_pose,
             "frame_id": self.frame_id or pose.frame_id,
@@ -237,8 +238,8 @@ def recommend_camera(
         )
     place = None if position is None else (camera @ np.append(position / 1000, 1.0))[:3]
     in_base = camera_pose is not None or is_posed
-    if isinstance(candidates, int):
-        poses, is_known = _sphere(candidates, place, camera, in_base), place is not None
+    if isinstance(candidates, int | np.integer):
+        poses, is_known = _sphere(int(candidates), place, camera, in_base), place is not None
     else:
         given = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
         poses = np.array(given).reshape(-1, 4, 4)

@@ -133,8 +133,10 @@ class OrientationTable:
         known = self.object_ids
         if object_id is None and len(known) > 1:
             choices = ", ".join(sorted(known, key=by_number))
-            raise UserError(f"the table has {len(known)} objects; name one of {choices}")
-        name = known[0] if object_id is None else object_id
+            raise UserError(
+                f"the table has {len(known)} objects; give `object_id`, one of {choices}"
+            )
+        name = known[0] if object_id is None else str(object_id)
         if name not in known:
             raise UserError(f"object {name} is not in the table: {nearest(name, known)}")
         return name
@@ -234,6 +236,11 @@ class OrientationTable:
         (False, True)
         """
         name = self.name_of(object_id)
+        given: Any = estimates
+        if not (isinstance(given, Sequence) and all(isinstance(e, PoseEstimate) for e in given)):
+            raise UserError("`estimates`: give a list of PoseEstimate")
+        if isinstance(candidates, float):
+            raise UserError(f"`candidates`={candidates:g}: give camera poses, or an integer")
         estimates, doubts = known_scores(estimates, self._scores)
         answer = recommend_camera(
             self.errors(name),
@@ -247,13 +254,13 @@ class OrientationTable:
         score = min((each.score for each in estimates if each.score is not None), default=None)
         last, pose = estimates[-1], cast(Any, camera_pose)
         last = last if pose is None else replace(last, camera_pose=pose)
-        given = dict.fromkeys(text for each in estimates for text in each.warnings)
+        of_poses = dict.fromkeys(text for each in estimates for text in each.warnings)
         return replace(
             answer,
             rotation=nearest_twin(answer.rotation, self.symmetry(name), last.camera_pose, previous),
             holds_where=detections.holds_where(score),
             bounds_deg=self._bounds_deg(name, estimates, answer.decision.verdict),
-            warnings=(*answer.warnings, *doubts, *given, *detections.warnings(score)),
+            warnings=(*answer.warnings, *doubts, *of_poses, *detections.warnings(score)),
             frame_id=last.frame_id if last.camera_pose is None else last.base_frame_id,
             camera_frame_id=last.frame_id,
         )
