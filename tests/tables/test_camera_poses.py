@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from nbv.core.orientations.group import ASYMMETRIC
 from nbv.errors import UserError
-from nbv.tables.camera_poses import contradictions
+from nbv.tables.camera_poses import contradictions, not_seeing
 
 OPENGL, MIRROR = np.diag([1.0, -1, -1, 1]), np.diag([1.0, -1, 1, 1])
 ROS = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
@@ -87,3 +87,20 @@ def test_another_instance_is_told():
         except UserError:
             pass
     assert n_told >= 0.9 * N_TRIED
+
+
+@pytest.mark.parametrize("name", ["OpenGL's", "a ROS body's", "inverted"])
+@pytest.mark.parametrize("whose", ["candidates are", "`camera_pose` is", "they and .* are"])
+def test_candidates_that_do_not_see_the_object_are_refused(name, whose):
+    named = 0
+    for seed in range(N_TRIED):
+        poses, seen, _ = views(seed, 12)
+        assert not_seeing(poses[1:], poses[0], seen[0], in_base=True) == []
+        wrong = MISTAKES[name](poses)
+        camera = poses[0] if whose == "candidates are" else wrong[0]
+        others = poses[1:] if whose == "`camera_pose` is" else wrong[1:]
+        try:
+            not_seeing(others, camera, seen[0], in_base=True)
+        except UserError as error:
+            named += bool(re.search(f"{whose} {name}", str(error)))
+    assert named >= 0.7 * N_TRIED

@@ -163,7 +163,7 @@ def test_candidates_that_look_away_are_left_out_and_counted(flipping):
     )
     (warning,) = set(answer.warnings) - set(wanted.warnings)
     assert warning.startswith(f"2 of {len(poses) + 2} candidates look away")
-    with pytest.raises(UserError, match="candidate 0: the object is behind this camera"):
+    with pytest.raises(UserError, match=r"^candidate 0: the object is 180° off .* OpenGL's"):
         flipping.recommend([turned(0)], [away, away, poses[0]])
 
 
@@ -187,10 +187,14 @@ def test_without_a_camera_pose_targets_are_in_the_camera(flipping):
     view = replace(turned(0), camera_pose=None)
     for answer, frame in (
         (flipping.recommend([view], 9), "frame of the present camera"),
-        (flipping.recommend([view], 9, camera_pose=np.eye(4)), "base frame"),
         (flipping.recommend([turned(0)], 9), "base frame"),
+        (flipping.recommend([view], 9, camera_pose=np.eye(4)), "base frame"),
     ):
         assert answer.frame == frame
+    targets = [move.target_camera_pose for move in answer.moves]
+    for camera_pose, is_told in ((None, True), (np.eye(4), False)):
+        told = flipping.recommend([view], targets, camera_pose=camera_pose).warnings
+        assert any("give `camera_pose`" in text for text in told) == is_told
 
 
 # Scores

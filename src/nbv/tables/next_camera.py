@@ -21,7 +21,7 @@ from nbv.errors import UserError
 from nbv.labels import counted, matrix_lines
 from nbv.numbers import FARTHEST_M, as_finite, as_position
 from nbv.poses import AnyPose, Pose, Source, as_given, as_pose, read_entries
-from nbv.tables.camera_poses import contradictions
+from nbv.tables.camera_poses import IN_CAMERA, contradictions, not_seeing
 
 INDEPENDENT_DEG = 60.0
 """Angle between views from which their errors are about independent (first half of T-LESS)."""
@@ -244,6 +244,16 @@ def recommend_camera(
         given = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
         poses = np.array(given).reshape(-1, 4, 4)
         is_known = True
+        if not in_base:
+            warnings.append(IN_CAMERA)
+    if position is not None and place is not None and len(poses):
+        from_m = np.linalg.norm(poses[:, :3, 3] - place, axis=1)
+        if (far := from_m > FARTHEST_M).any():
+            raise UserError(
+                f"candidate {far.argmax()}: the object is {from_m[far.argmax()]:.0f} m away: give "
+                "it and `camera_pose` in metres, not millimetres"
+            )
+        warnings += not_seeing(poses, camera, position / 1000, in_base=in_base)
     targets, is_away = _straight_targets(poses, place, straightened)
     if n_away := int(is_away.sum()):
         warnings.append(
@@ -377,17 +387,6 @@ def _straight_targets(
         return from_base, np.zeros(len(poses), dtype=bool)
     position = (from_base @ (place - poses[:, :3, 3])[:, :, None])[..., 0]
     behind = position[:, 2] <= 0
-    if behind.sum() > len(behind) / 2:
-        raise UserError(
-            f"candidate {behind.argmax()}: the object is behind this camera: give poses of the "
-            "optical frame (z forward) in the base frame, camera to base, in metres"
-        )
-    away = np.linalg.norm(position, axis=1)
-    if (far := away > FARTHEST_M).any():
-        raise UserError(
-            f"candidate {far.argmax()}: the object is {away[far.argmax()]:.0f} m away: give camera "
-            "poses in metres, not millimetres"
-        )
     position[behind] = [0, 0, 1]
     return along_ray(position) @ from_base if straightened else from_base, behind
 
