@@ -27,8 +27,8 @@ def views(seed, n=2):
     return poses, seen, poses[:, :3, :3].swapaxes(1, 2) @ truth
 
 
-def in_mm(poses):
-    return poses * np.append(np.ones((4, 3)), [[1000], [1000], [1000], [1]], axis=1)
+def in_mm(poses, per_m=1000):
+    return poses * np.append(np.ones((4, 3)), [[per_m], [per_m], [per_m], [1]], axis=1)
 
 
 def transposed(poses):
@@ -44,6 +44,7 @@ MISTAKES = {
     "inverted": np.linalg.inv,
     "left-handed": lambda poses: MIRROR @ poses @ MIRROR,
     "in millimetres": in_mm,
+    "in centimetres": lambda poses: in_mm(poses, 100),
     "with transposed rotations": transposed,
     "inverted .* and OpenGL's": lambda poses: np.linalg.inv(poses @ OPENGL),
     "inverted .* and in millimetres": lambda poses: in_mm(np.linalg.inv(poses)),
@@ -74,6 +75,15 @@ def test_right_poses_are_taken_whatever_flips_and_noise(n):
             assert contradictions(poses, seen, given, ASYMMETRIC) == []
         noisy = seen * rng.uniform(0.97, 1.03, (n, 1))
         assert contradictions(poses, noisy, flipped, ASYMMETRIC) == []
+
+
+@pytest.mark.parametrize("per_m", [50, 1000])
+def test_a_unit_that_brings_no_agreement_is_not_named(per_m):
+    for seed in range(N_TRIED):
+        poses, *seen = views(seed)
+        poses[1] = in_mm(poses[1:], per_m)[0]
+        (told,) = contradictions(poses, *seen, ASYMMETRIC)
+        assert "are the camera poses right?" in told
 
 
 def test_another_instance_is_told():

@@ -33,7 +33,7 @@ AXES = {OPTICAL: "", "-z forward, -y down": "OpenGL's", "+x forward, -z down": "
 RIGHT = "give those of the optical frame (z forward, y down), camera to base, in metres"
 INVERTED = "inverted (base to camera)"
 WAYS = ("", INVERTED, "with transposed rotations")
-UNITS = {"": 1.0, "in millimetres": 1e-3}
+UNITS = {"": 1.0, "in millimetres": 1e-3, "in centimetres": 1e-2}
 HANDS = {"": 1.0, "left-handed (Unity's)": -1.0}
 
 
@@ -68,7 +68,8 @@ def contradictions(
         agree = f"{what}; they agree if camera poses are {name}: {RIGHT}"
         if is_told and other.max() <= AGREEING:
             raise UserError(agree)
-        if other.max() <= most / 3 and other_deg <= TURNED_DEG / 2:
+        # Poses that are taken to be in millimetres are always near each other.
+        if other.max() <= min(most / 3, TOLD) and other_deg <= TURNED_DEG / 2:
             return [agree]
     return [f"{what}: do they see the same instance, and are the camera poses right?"] * is_told
 
