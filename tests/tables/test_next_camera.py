@@ -210,15 +210,23 @@ def test_a_score_of_none_is_no_score(flipping):
     assert scored(flipping, 0.4) != scored(flipping, None)
     none = replace(flipping, score=np.full(300, -1.0))
     assert scored(none, -1) == scored(none, 0.5) == scored(replace(none, score=None), None)
+    some = replace(none, score=np.where(np.arange(300) < 3, -1.0, flipping.score))
+    assert scored(some, 0.5) == scored(none, 0.5)
     logits = replace(flipping, score=np.log(flipping.score / (1 - flipping.score)))
     assert scored(logits, -1) != scored(logits, None)
 
 
 @pytest.mark.parametrize(
     ("unit", "score", "is_odd"),
-    [(1, score, not 0 <= score <= 1) for score in (0.0, 1.0, 1.01, -0.5, 87.0)]
-    + [(100, score, not 0 <= score <= 120) for score in (20.0, 110.0, -5.0, 1000.0)],
+    [(1, score, not 0.1 <= score <= 1) for score in (-0.1, 0.1, 1.0, 1.01, -0.5, 87.0)]
+    + [(100, score, not 1 < score <= 120) for score in (20.0, 110.0, -5.0, 1000.0, 0.9)],
 )
 def test_a_score_of_another_scale_is_told(flipping, unit, score, is_odd):
     _, warnings = scored(replace(flipping, score=unit * flipping.score), score)
     assert any("another scale" in text for text in warnings) == is_odd
+
+
+def test_a_low_score_is_told_where_calibration_has_none(flipping):
+    narrow = replace(flipping, score=0.9 + 0.1 * flipping.score)
+    for score, is_odd in ((0.95, False), (0.5, True)):
+        assert any("worse than those" in text for text in scored(narrow, score)[1]) == is_odd

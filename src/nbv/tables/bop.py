@@ -24,6 +24,7 @@ from nbv.numbers import (
     position_column,
 )
 from nbv.tables.detections import Detections
+from nbv.tables.next_camera import NO_SCORE, scores_of_all
 from nbv.tables.orientation_table import FLIP_DEG, OrientationTable
 
 KEYS = ("scene_id", "im_id", "obj_id")
@@ -140,6 +141,11 @@ def read_orientation_table(
         if (column(path, rows, name, 9) != read.reshape(-1, 9)).any():
             left_out.append(f"{name}: {ROUNDED}")
     score = column(path, rows, "score") if "score" in rows else None
+    if score is not None and scores_of_all(score) is None and (score != NO_SCORE).any():
+        left_out.append(
+            f"{(score == NO_SCORE).sum()} of {len(score)} pairs have the score -1, BOP's for none, "
+            "so that no scores are used; `least_score` 0 leaves these pairs out"
+        )
     positions = position_column(path, rows, "t_true_mm") if "t_true_mm" in rows else None
     _check_way_round(path, rows, truths, estimates)
     if positions is not None:

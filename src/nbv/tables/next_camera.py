@@ -343,6 +343,14 @@ def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:
     return np.array(scores) if scores else None
 
 
+def scores_of_all(scores: Array | None) -> Array | None:
+    """Return the scores (n,) of calibration pairs if every pair has one; BOP's for none is none."""
+    if scores is None or not np.isfinite(scores).all():
+        return None
+    is_none = scores == NO_SCORE
+    return None if is_none.any() and (scores[~is_none] >= 0).all() else scores
+
+
 def known_scores(
     estimates: Sequence[PoseEstimate], calibrated: Array | None
 ) -> tuple[Sequence[PoseEstimate], list[str]]:
@@ -355,12 +363,15 @@ def known_scores(
     if calibrated is None:
         return estimates, []
     low, high = calibrated.min(), calibrated.max()
-    margin = (high - low) / 2
-    least, most = (0, 1) if low >= 0 and high <= 1 else (low - margin, high + margin)
-    odd = [e.score for e in estimates if e.score is not None and not least <= e.score <= most]
+    margin, is_share = (high - low) / 2, 0 <= low <= high <= 1
+    odd = [
+        score
+        for score in (e.score for e in estimates if e.score is not None)
+        if not low - margin <= score <= high + margin or (low > 1 if 0 <= score <= 1 else is_share)
+    ]
     return estimates, [
         f"the score {score:g} is far from those of calibration, {low:g} to {high:g}: is it of "
-        "another scale, such as a logit?"
+        "another scale, such as a logit, or the estimate worse than those?"
         for score in odd[:1]
     ]
 

@@ -28,12 +28,12 @@ from nbv.poses import AnyPose
 from nbv.tables.detections import Detections
 from nbv.tables.next_camera import (
     MOST_VIEWS,
-    NO_SCORE,
     CameraRecommendation,
     PoseEstimate,
     known_scores,
     nearest_twin,
     recommend_camera,
+    scores_of_all,
 )
 
 FLIP_DEG = OrientationErrors.flip_deg
@@ -71,7 +71,7 @@ class OrientationTable:
     estimate, truth : ndarray (n, 3, 3)
         Poses, object to camera.
     score : ndarray (n,), optional
-        The estimator's scores; unused where one is NaN.
+        The estimator's scores; unused where one is NaN, or -1, BOP's for none.
     straightened : bool
         Whether poses were rotated onto the optical axis (positions known).
     symmetries : mapping
@@ -145,14 +145,6 @@ class OrientationTable:
         """Return the errors on an object; its name and errors are those of `name_of`."""
         return self._errors[self.name_of(object_id)]
 
-    @property
-    def _scores(self) -> Array | None:
-        """Scores (n,), if every pair has one; BOP's for none is no score."""
-        score = self.score
-        if score is None or not np.isfinite(score).all() or (score == NO_SCORE).all():
-            return None
-        return score
-
     @cached_property
     def _errors(self) -> dict[str, OrientationErrors]:
         rows = {name: self.object_id == name for name in self.object_ids}
@@ -168,7 +160,7 @@ class OrientationTable:
         }
         flips = np.concatenate([each.is_flip for each in errors.values()])
         share, ratio = (flips.sum() + 0.5) / (len(flips) + 1), None
-        if (known := self._scores) is not None:
+        if (known := scores_of_all(self.score)) is not None:
             scores = np.concatenate([known[k] for k in rows.values()])
             ratio = ScoreRatio.fit(scores, flips)
         strength = shrinkage(list(errors.values()))
@@ -241,7 +233,7 @@ class OrientationTable:
             raise UserError("`estimates`: give a list of PoseEstimate")
         if isinstance(candidates, float):
             raise UserError(f"`candidates`={candidates:g}: give camera poses, or an integer")
-        estimates, doubts = known_scores(estimates, self._scores)
+        estimates, doubts = known_scores(estimates, scores_of_all(self.score))
         answer = recommend_camera(
             self.errors(name),
             estimates,
