@@ -108,7 +108,6 @@ def not_seeing(poses: Array, camera: Array, seen_m: Array, *, in_base: bool) -> 
             if off_deg(turned, np.where(of[:, None], moved, origin))[1] < ON_AXIS_DEG:
                 raise UserError(f"{what}; it is near the axis if {who} {name}: {RIGHT}")
     told = f"{what}: do they see it, and is `camera_pose` right? {RIGHT}"
-    told = told if in_base else f"{told}; {IN_CAMERA}"
     if median_deg >= 90:
         raise UserError(told)
     return [told]
