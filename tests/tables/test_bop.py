@@ -53,8 +53,8 @@ def test_every_estimate_and_instance_is_accounted_for(scene, tmp_path):
     rng = np.random.default_rng(0)
     rows["score"] = rng.permutation(len(rows)) / 100
     failed, missed, far, twice = np.split(rng.choice(len(rows), 20, replace=False), 4)
-    rows.loc[failed, "R"] = ["nan " * 9, "", IDENTITY, IDENTITY, "1 0 nan 0 1 0 0 0 1"]
-    rows.loc[failed, "t"] = ["0 0 700", "0 0 700", "0 0 0", "0.0 -0 0", "0 0 700"]
+    rows.loc[failed, "R"] = ["nan " * 9, "0 " * 9, IDENTITY, "", "1 0 nan 0 1 0 0 0 1"]
+    rows.loc[failed, "t"] = ["0 0 700", "0 0 0", "0.0 -0 0", "0 0 700", "0 0 700"]
     rows.loc[far, "t"] = "0 100 700"
     worse = rows.loc[twice].assign(score=-1.0)
     found = read(tmp_path, pd.concat([rows.drop(index=missed), worse]), truths)
@@ -90,6 +90,11 @@ def test_limits_of_distance_and_score_are_the_users(scene, tmp_path):
     assert "below" not in warned[1]
     with pytest.raises(UserError, match=r"no score is 2 or more.*`least_score`"):
         read(tmp_path, rows, truths, least_score=2)
+    with pytest.raises(UserError, match="`least_score` is not a finite number"):
+        read(tmp_path, rows, truths, least_score=np.nan)
+    rows.loc[41, "score"] = -1
+    assert "1 of 60 pairs have the score -1" in " ".join(read(tmp_path, rows, truths).left_out)
+    assert "-1" not in " ".join(read(tmp_path, rows, truths, least_score=0).left_out)
 
 
 def test_a_failure_is_no_mistake(scene, tmp_path):
@@ -164,7 +169,9 @@ def test_truths_of_one_of_several_cameras_are_named(scene, tmp_path):
     read(tmp_path, rows, truths)
     file = tmp_path / "000005" / "scene_gt.json"
     file.rename(file.with_name("scene_gt_cam1.json"))
-    with pytest.raises(UserError, match=r"copy .*000005/scene_gt_cam1\.json there"):
+    for other in ("camera_coco", "camera_info", "info"):
+        (file.parent / f"scene_gt_{other}.json").touch()
+    with pytest.raises(UserError, match=r"copy .*000005/scene_gt_cam1\.json, .* to scene_gt"):
         read_orientation_table(tmp_path / "results.csv")
 
 
@@ -179,6 +186,9 @@ def test_objects_without_an_entry_are_named(scene, tmp_path):
     (tmp_path / "m.json").write_text('{"000001": {}, "2": {}}')
     found = read(tmp_path, rows, truths, models_info=tmp_path / "m.json")
     assert "m.json has no entry for object 1 (it has 000001, 2)" in found.left_out[0]
+    (tmp_path / "m.json").write_text('{"000001": {}, "1": {}}')
+    with pytest.raises(UserError, match=r"m\.json has an object twice"):
+        read(tmp_path, rows, truths, models_info=tmp_path / "m.json")
 
 
 def test_instances_of_a_static_scene_are_told_apart(scene, tmp_path):

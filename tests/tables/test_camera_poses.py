@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from nbv.core.orientations.group import ASYMMETRIC
 from nbv.errors import UserError
-from nbv.tables.camera_poses import contradictions
+from nbv.tables.camera_poses import contradictions, not_seeing
 
 OPENGL, MIRROR = np.diag([1.0, -1, -1, 1]), np.diag([1.0, -1, 1, 1])
 ROS = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
@@ -27,8 +27,8 @@ def views(seed, n=2):
     return poses, seen, poses[:, :3, :3].swapaxes(1, 2) @ truth
 
 
-def in_mm(poses):
-    return poses * np.append(np.ones((4, 3)), [[1000], [1000], [1000], [1]], axis=1)
+def in_mm(poses, per_m=1000):
+    return poses * np.append(np.ones((4, 3)), [[per_m], [per_m], [per_m], [1]], axis=1)
 
 
 def transposed(poses):
@@ -44,6 +44,7 @@ MISTAKES = {
     "inverted": np.linalg.inv,
     "left-handed": lambda poses: MIRROR @ poses @ MIRROR,
     "in millimetres": in_mm,
+    "in centimetres": lambda poses: in_mm(poses, 100),
     "with transposed rotations": transposed,
     "inverted .* and OpenGL's": lambda poses: np.linalg.inv(poses @ OPENGL),
     "inverted .* and in millimetres": lambda poses: in_mm(np.linalg.inv(poses)),
@@ -76,6 +77,15 @@ def test_right_poses_are_taken_whatever_flips_and_noise(n):
         assert contradictions(poses, noisy, flipped, ASYMMETRIC) == []
 
 
+@pytest.mark.parametrize("per_m", [50, 1000])
+def test_a_unit_that_brings_no_agreement_is_not_named(per_m):
+    for seed in range(N_TRIED):
+        poses, *seen = views(seed)
+        poses[1] = in_mm(poses[1:], per_m)[0]
+        (told,) = contradictions(poses, *seen, ASYMMETRIC)
+        assert "are the camera poses right?" in told
+
+
 def test_another_instance_is_told():
     n_told = 0
     for seed in range(N_TRIED):
@@ -87,3 +97,20 @@ def test_another_instance_is_told():
         except UserError:
             pass
     assert n_told >= 0.9 * N_TRIED
+
+
+@pytest.mark.parametrize("name", ["OpenGL's", "a ROS body's", "inverted"])
+@pytest.mark.parametrize("whose", ["candidates are", "`camera_pose` is", "they and .* are"])
+def test_candidates_that_do_not_see_the_object_are_refused(name, whose):
+    named = 0
+    for seed in range(N_TRIED):
+        poses, seen, _ = views(seed, 12)
+        assert not_seeing(poses[1:], poses[0], seen[0], in_base=True) == []
+        wrong = MISTAKES[name](poses)
+        camera = poses[0] if whose == "candidates are" else wrong[0]
+        others = poses[1:] if whose == "`camera_pose` is" else wrong[1:]
+        try:
+            not_seeing(others, camera, seen[0], in_base=True)
+        except UserError as error:
+            named += bool(re.search(f"{whose} {name}", str(error)))
+    assert named >= 0.7 * N_TRIED

@@ -117,6 +117,38 @@ def test_a_camera_far_from_the_base_is_told(flipping):
         assert any("millimetres" in text for text in answer.warnings) == (metres > 50)
 
 
+@pytest.mark.parametrize("table_of", ["table", "flipping"])
+def test_estimates_that_contradict_each_other_are_never_enough(request, table_of):
+    made = request.getfixturevalue(table_of)
+    if table_of == "flipping":
+        made = replace(made, estimate=made.truth)
+    views, flip = [turned(0), turned(100)], Rotation.from_euler("x", 180, degrees=True).as_matrix()
+    for given in (views, [PoseEstimate(np.eye(3))]):
+        assert made.recommend(given, 20).decision.verdict == "enough"
+        last = given[-1]
+        other = replace(last, rotation=last.rotation @ flip)
+        answer = made.recommend([*given[: len(given) - 1 or 1], other], 20)
+        assert answer.decision.verdict != "enough"
+
+
+@pytest.mark.parametrize("score", [np.nan, np.inf, "high", [0.4, 0.5]])
+def test_a_score_is_a_finite_number(score):
+    with pytest.raises(UserError, match="score is not a finite number"):
+        PoseEstimate(np.eye(3), score=score)
+
+
+def test_what_is_no_list_of_estimates_is_named(table):
+    view = PoseEstimate(np.eye(3))
+    for given in (view, [np.eye(4)], np.eye(4)):
+        with pytest.raises(UserError, match="`estimates`: give a list of PoseEstimate"):
+            table.recommend(given, 9)
+    with pytest.raises(UserError, match="`candidates`=9: give camera poses, or an integer"):
+        table.recommend([view], 9.0)
+    named = replace(table, object_id=np.full(20, "1"), symmetries={})
+    wanted = named.recommend([view], 9, object_id="1")
+    assert named.recommend([view], np.int64(9), object_id=1).decision == wanted.decision
+
+
 # Candidates
 
 
@@ -131,7 +163,7 @@ def test_candidates_that_look_away_are_left_out_and_counted(flipping):
     )
     (warning,) = set(answer.warnings) - set(wanted.warnings)
     assert warning.startswith(f"2 of {len(poses) + 2} candidates look away")
-    with pytest.raises(UserError, match="candidate 0: the object is behind this camera"):
+    with pytest.raises(UserError, match=r"^candidate 0: the object is 180° off .* OpenGL's"):
         flipping.recommend([turned(0)], [away, away, poses[0]])
 
 
@@ -155,10 +187,14 @@ def test_without_a_camera_pose_targets_are_in_the_camera(flipping):
     view = replace(turned(0), camera_pose=None)
     for answer, frame in (
         (flipping.recommend([view], 9), "frame of the present camera"),
-        (flipping.recommend([view], 9, camera_pose=np.eye(4)), "base frame"),
         (flipping.recommend([turned(0)], 9), "base frame"),
+        (flipping.recommend([view], 9, camera_pose=np.eye(4)), "base frame"),
     ):
         assert answer.frame == frame
+    targets = [move.target_camera_pose for move in answer.moves]
+    for camera_pose, is_told in ((None, True), (np.eye(4), False)):
+        told = flipping.recommend([view], targets, camera_pose=camera_pose).warnings
+        assert any("give `camera_pose`" in text for text in told) == is_told
 
 
 # Scores
@@ -174,15 +210,23 @@ def test_a_score_of_none_is_no_score(flipping):
     assert scored(flipping, 0.4) != scored(flipping, None)
     none = replace(flipping, score=np.full(300, -1.0))
     assert scored(none, -1) == scored(none, 0.5) == scored(replace(none, score=None), None)
+    some = replace(none, score=np.where(np.arange(300) < 3, -1.0, flipping.score))
+    assert scored(some, 0.5) == scored(none, 0.5)
     logits = replace(flipping, score=np.log(flipping.score / (1 - flipping.score)))
     assert scored(logits, -1) != scored(logits, None)
 
 
 @pytest.mark.parametrize(
     ("unit", "score", "is_odd"),
-    [(1, score, not 0 <= score <= 1) for score in (0.0, 1.0, 1.01, -0.5, 87.0)]
-    + [(100, score, not 0 <= score <= 120) for score in (20.0, 110.0, -5.0, 1000.0)],
+    [(1, score, not 0.1 <= score <= 1) for score in (-0.1, 0.1, 1.0, 1.01, -0.5, 87.0)]
+    + [(100, score, not 1 < score <= 120) for score in (20.0, 110.0, -5.0, 1000.0, 0.9)],
 )
 def test_a_score_of_another_scale_is_told(flipping, unit, score, is_odd):
     _, warnings = scored(replace(flipping, score=unit * flipping.score), score)
     assert any("another scale" in text for text in warnings) == is_odd
+
+
+def test_a_low_score_is_told_where_calibration_has_none(flipping):
+    narrow = replace(flipping, score=0.9 + 0.1 * flipping.score)
+    for score, is_odd in ((0.95, False), (0.5, True)):
+        assert any("worse than those" in text for text in scored(narrow, score)[1]) == is_odd

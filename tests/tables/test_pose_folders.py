@@ -36,25 +36,30 @@ def test_what_has_no_pair_is_counted(example):
     scene, truths = example / "ob_in_cam/000001", example / "truth/000001"
     np.savetxt(scene / "000000.txt", np.full((4, 4), np.nan))
     np.savetxt(scene / "000001.txt", np.eye(4))
+    np.savetxt(scene / "000005.txt", np.zeros((4, 4)))
+    (scene / "000006.txt").write_text("")
     (scene / "000002.txt").unlink()
     (truths / "000003.txt").unlink()
     far = np.loadtxt(scene / "000004.txt")
     far[0, 3] += 0.08
     np.savetxt(scene / "000004.txt", far)
     found = read(example)
-    assert len(found.estimate) == 155
+    assert len(found.estimate) == 153
     assert [text.split(" estimates ")[0] for text in found.left_out] == [
         "1 of 158",
         "1 of 159",
         "1 of 159 truths have no estimate",
-        "2 of 157",
+        "4 of 157",
     ]
-    assert len(read(example, nearest_mm=100).estimate) == 156
+    assert len(read(example, nearest_mm=100).estimate) == 154
 
 
 def test_what_is_no_pose_is_named(example):
     with pytest.raises(UserError, match="give `ground_truth`"):
         read_pose_folders(example / "ob_in_cam", None)
+    for truth in (example / "none", example / "results.csv"):
+        with pytest.raises(UserError, match=f"^`ground_truth`={truth} .*; give a folder of poses"):
+            read_pose_folders(example / "ob_in_cam", truth)
     with pytest.raises(UserError, match="the name of its `object`"):
         read(example, models_info=example / "models_info.json")
     (example / "ob_in_cam/000002/000007.txt").write_text("1 2 3")

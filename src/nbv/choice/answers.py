@@ -92,7 +92,8 @@ class Answer(Generic[AnyMove]):
         Whether a candidate is expected to lower the error by more than its noise; None if that is
         unknown.
     no_flips : bool
-        Whether calibration shows no flips of the object: enough, unless limits are given.
+        Whether calibration shows no flips of the object, and the estimates agree: enough, unless
+        limits are given.
     frame_id : str or None
         The frame of the target camera poses, if a ROS message named it.
     """

@@ -9,6 +9,7 @@ from dataclasses import asdict, fields, replace
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from nbv.cli.arguments import in_flags
 from nbv.errors import UserError, printable
 from nbv.labels import counted, matrix_lines
 
@@ -69,7 +70,7 @@ def with_targets(
 def print_warnings(warnings: Iterable[str], start: str = "") -> None:
     """Print one line for each warning."""
     for warning in warnings:
-        print_line(f"warning: {warning}", start)
+        print_line(f"warning: {in_flags(warning)}", start)
 
 
 _KEYS = (
@@ -113,6 +114,7 @@ def show_answer(
     JSON has keys for the camera's pose after each move if the answer `has_targets`. With another
     `form` the answer is a comment above the next camera pose, whose quaternion has that order.
     """
+    answer = replace(answer, warnings=tuple(map(in_flags, answer.warnings)))
     decision = answer.decide(stop.until, stop.until_probability, stop.within)
     if as_json or form == "json":
         enough = None if stop.until is None else answer.expected_error_deg <= stop.until

@@ -56,7 +56,7 @@ def as_rotations_or_file(_kind: Any, tokens: Sequence[Token]) -> list[float] | P
         low, _, high = text.partition(":")
         first, last = _number(float, low), _number(float, high or low)
         if not 0 <= last - first <= 360:
-            raise ValueError(f"{text!r}: give the lower end first, and at most a full turn")
+            raise ValueError(f"{text!r}: give numbers, the lower first, and at most a full turn")
         rotations += [first + step for step in range(math.ceil(last - first))] + [last]
     return rotations
 
@@ -107,7 +107,7 @@ SHIPPED = "mug"
 
 def flag(name: str) -> str:
     """Return the flag of a field of options, or of a library's parameter."""
-    return "--" + re.sub("_(deg|mm?)$", "", name).replace("_", "-")
+    return "--" + re.sub("_(deg|mm?|id)$", "", name).replace("_", "-")
 
 
 def in_flags(message: str) -> str:

@@ -20,6 +20,7 @@ from nbv.cli.arguments import (
     MoveOptions,
     Numbers,
     StopOptions,
+    WholeNumber,
     as_paragraphs,
     check_options,
 )
@@ -74,7 +75,7 @@ class CandidateOptions:
 
     object: str | None = None
     candidates: Path | None = None
-    sphere: int | None = None
+    sphere: WholeNumber | None = None
     previous: Path | None = None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from nbv.numbers import (
     position_column,
 )
 from nbv.tables.detections import Detections
+from nbv.tables.next_camera import NO_SCORE, scores_of_all
 from nbv.tables.orientation_table import FLIP_DEG, OrientationTable
 
 KEYS = ("scene_id", "im_id", "obj_id")
@@ -40,7 +42,7 @@ SAME_MOVE_DEG = 1.0
 """Truths of one move of the camera differ by less."""
 
 PAIR = "have a truth"
-FAILED = "are failures: nan, empty, or exactly R = 1 with t = 0"
+FAILED = "are failures: nan, empty, zeros, or exactly R = 1 with t = 0"
 BELOW = "have a score below {1:g}"
 ELSEWHERE = "are of scenes without truth"
 FARTHER = "are farther than {0:g} mm from every instance of their object"
@@ -93,6 +95,7 @@ def read_orientation_table(
     if (n_failed := (fate == FAILED).sum()) > len(fate) / 2:
         raise UserError(f"{path}: {n_failed} of {len(fate)} estimates {FAILED}; give more poses")
     if least_score is not None:
+        as_finite(least_score, "`least_score`", 1)
         need_columns(path, given, ("score",))
         is_below = column(path, given[fate == PAIR], "score") < least_score
         fate[fate == PAIR] = np.where(is_below, BELOW, PAIR)
@@ -111,6 +114,8 @@ def read_orientation_table(
     if n_missed := int(missed.sum()):
         left_out.append(f"{n_missed} of {n_missed + len(rows)} instances have no estimate")
     symmetries = {} if models_info is None else _read_entries(Path(models_info))
+    if len(set(map(by_number, symmetries))) < len(symmetries):
+        raise UserError(f"{models_info} has an object twice, such as 1 and 000001; keep one")
     known = set(rows["object_id"])
     for name in objects:
         if name not in known:
@@ -140,6 +145,11 @@ def read_orientation_table(
         if (column(path, rows, name, 9) != read.reshape(-1, 9)).any():
             left_out.append(f"{name}: {ROUNDED}")
     score = column(path, rows, "score") if "score" in rows else None
+    if score is not None and scores_of_all(score) is None and (score != NO_SCORE).any():
+        left_out.append(
+            f"{(score == NO_SCORE).sum()} of {len(score)} pairs have the score -1, BOP's for none, "
+            "so that no scores are used; `least_score` 0 leaves these pairs out"
+        )
     positions = position_column(path, rows, "t_true_mm") if "t_true_mm" in rows else None
     _check_way_round(path, rows, truths, estimates)
     if positions is not None:
@@ -177,7 +187,7 @@ def groups_of(rows: pd.DataFrame) -> NDArray[np.str_]:
 
 def _with_keys(path: Path, rows: pd.DataFrame) -> pd.DataFrame:
     for key in KEYS:
-        numbers = column(path, rows, key)
+        numbers = column(path, rows, key, limit=9e18)
         if (is_part := numbers % 1 != 0).any():
             row = rows.index[is_part.argmax()]
             raise UserError(f"{path}, row {row + 2}: {key} {rows[key][row]} is no integer")
@@ -192,7 +202,8 @@ def _is_failure(pose: str) -> bool:
     except ValueError:
         return False
     is_start = np.array_equal(numbers, [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0])
-    return bool(np.isnan(numbers).any() or is_start)
+    is_zero = len(numbers) >= 9 and not numbers[:9].any()
+    return bool(np.isnan(numbers).any() or is_start or is_zero)
 
 
 def _matched(
@@ -296,8 +307,9 @@ def _read_scenes(folder: Path, wanted: set[str]) -> tuple[pd.DataFrame, set[str]
                     f"{file}, image {image}: an instance lacks obj_id, cam_R_m2c or cam_t_m2c"
                 ) from None
     if not images:
-        found = next(folder.glob("*/scene_gt_*.json"), None)
-        hint = "" if found is None else f"; copy {found} there, or that of the camera in use"
+        files = sorted(folder.glob("*/scene_gt_*.json"))
+        found = [file for file in files if not re.search("info|coco", file.name)][:1]
+        hint = f"; copy {found[0]}, or that of the camera in use, to scene_gt.json" if found else ""
         raise UserError(f"{folder} has no <scene>/scene_gt.json of a scene of the estimates{hint}")
     return pd.DataFrame(truths, columns=[*KEYS, "R", "t"], dtype=str), images
 

@@ -1,4 +1,4 @@
-"""Camera poses of several views that contradict the places where they see the object."""
+"""Camera poses that contradict the places where they see the object, or do not see it."""
 
 from __future__ import annotations
 
@@ -17,13 +17,23 @@ TURNED_DEG = 20.0
 """Orientations in the base frame that differ by more contradict each other, unless one is a flip;
 those by less than half agree."""
 
+OFF_AXIS_DEG, ON_AXIS_DEG = 45.0, 15.0
+"""Medians of the angle between candidates' optical axes and the object: by more they do not see it;
+by less they do."""
+
+IN_CAMERA = (
+    "candidates are taken to be in the present camera's frame: if they are in the base frame, give "
+    "`camera_pose`"
+)
+
 OPTICAL = "+z forward, +y down"
 AXES = {OPTICAL: "", "-z forward, -y down": "OpenGL's", "+x forward, -z down": "a ROS body's"}
 """Likely axes of a camera, and what they are called."""
 
+RIGHT = "give those of the optical frame (z forward, y down), camera to base, in metres"
 INVERTED = "inverted (base to camera)"
 WAYS = ("", INVERTED, "with transposed rotations")
-UNITS = {"": 1.0, "in millimetres": 1e-3}
+UNITS = {"": 1.0, "in millimetres": 1e-3, "in centimetres": 1e-2}
 HANDS = {"": 1.0, "left-handed (Unity's)": -1.0}
 
 
@@ -55,15 +65,52 @@ def contradictions(
     )
     for name, rotation, origin in _conventions(poses):
         other, other_deg = apart(rotation, origin)
-        agree = (
-            f"{what}; they agree if camera poses are {name}: give those of the optical frame "
-            "(z forward, y down), camera to base, in metres"
-        )
+        agree = f"{what}; they agree if camera poses are {name}: {RIGHT}"
         if is_told and other.max() <= AGREEING:
             raise UserError(agree)
-        if other.max() <= most / 3 and other_deg <= TURNED_DEG / 2:
+        # Poses that are taken to be in millimetres are always near each other.
+        if other.max() <= min(most / 3, TOLD) and other_deg <= TURNED_DEG / 2:
             return [agree]
     return [f"{what}: do they see the same instance, and are the camera poses right?"] * is_told
+
+
+def not_seeing(poses: Array, camera: Array, seen_m: Array, *, in_base: bool) -> list[str]:
+    """Return a warning where most candidates (n, 4, 4) do not see the object.
+
+    It is at `seen_m` (3,) in a camera (4, 4), whose pose is known if poses are `in_base`. A
+    UserError says so where the object is behind most candidates, or they see it if they, or the
+    camera's pose, are of another convention, which it names.
+    """
+    every = np.concatenate([poses, camera[None]])
+    is_camera = np.arange(len(every)) == len(poses)
+
+    def off_deg(rotation: Orientations, origin: Array) -> tuple[Array, float]:
+        rays = rotation[-1] @ seen_m + origin[-1] - origin[:-1]
+        cosine = (rays * rotation[:-1, :, 2]).sum(axis=1) / np.linalg.norm(rays, axis=1)
+        angles = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+        return angles, float(np.sort(angles)[(len(angles) - 1) // 2])
+
+    rotation, origin = every[:, :3, :3], every[:, :3, 3]
+    angles, median_deg = off_deg(rotation, origin)
+    if median_deg <= OFF_AXIS_DEG:
+        return []
+    what = (
+        f"candidate {angles.argmax()}: the object is {angles.max():.0f}° off the optical axis, "
+        f"{median_deg:.0f}° in the median of candidates"
+    )
+    whose = {"candidates are": ~is_camera}
+    if in_base:
+        whose |= {"`camera_pose` is": is_camera, "they and `camera_pose` are": is_camera | True}
+    for name, *others in _conventions(every):
+        for who, of in whose.items():
+            turned, moved = others
+            turned = np.where(of[:, None, None], turned, rotation)
+            if off_deg(turned, np.where(of[:, None], moved, origin))[1] < ON_AXIS_DEG:
+                raise UserError(f"{what}; it is near the axis if {who} {name}: {RIGHT}")
+    told = f"{what}: do they see it, and is `camera_pose` right? {RIGHT}"
+    if median_deg >= 90:
+        raise UserError(told)
+    return [told]
 
 
 def _conventions(poses: Array) -> Iterator[tuple[str, Orientations, Array]]:

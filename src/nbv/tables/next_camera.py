@@ -21,7 +21,7 @@ from nbv.errors import UserError
 from nbv.labels import counted, matrix_lines
 from nbv.numbers import FARTHEST_M, as_finite, as_position
 from nbv.poses import AnyPose, Pose, Source, as_given, as_pose, read_entries
-from nbv.tables.camera_poses import contradictions
+from nbv.tables.camera_poses import IN_CAMERA, contradictions, not_seeing
 
 INDEPENDENT_DEG = 60.0
 """Angle between views from which their errors are about independent (first half of T-LESS)."""
@@ -47,8 +47,8 @@ NO_DEPENDENCE = (
 )
 
 NO_SCORES = (
-    "no scores, of the estimate or of calibration: flips are hard to tell, and a stop rests on "
-    "little"
+    "no scores, of the estimate or of calibration (-1 is BOP's for none): flips are hard to tell, "
+    "and a stop rests on little"
 )
 
 
@@ -75,7 +75,7 @@ class PoseEstimate:
     Raises
     ------
     UserError
-        If a pose is none, or the camera cannot see the object there.
+        If a pose is none, the camera cannot see the object there, or the score is no finite number.
 
     Examples
     --------
@@ -102,6 +102,7 @@ class PoseEstimate:
             camera = as_given(self.camera_pose, "camera pose")
         for name, value in {
             "rotation": pose.rotation,
+            "score": None if self.score is None else as_finite(self.score, "score", 1).item(),
             "position_mm": pose.position_mm if position is None else as_position(position, "t"),
             "camera_pose": camera and camera.camera_pose,
             "frame_id": self.frame_id or pose.frame_id,
@@ -237,12 +238,22 @@ def recommend_camera(
         )
     place = None if position is None else (camera @ np.append(position / 1000, 1.0))[:3]
     in_base = camera_pose is not None or is_posed
-    if isinstance(candidates, int):
-        poses, is_known = _sphere(candidates, place, camera, in_base), place is not None
+    if isinstance(candidates, int | np.integer):
+        poses, is_known = _sphere(int(candidates), place, camera, in_base), place is not None
     else:
         given = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
         poses = np.array(given).reshape(-1, 4, 4)
         is_known = True
+        if not in_base:
+            warnings.append(IN_CAMERA)
+    if position is not None and place is not None and len(poses):
+        from_m = np.linalg.norm(poses[:, :3, 3] - place, axis=1)
+        if (far := from_m > FARTHEST_M).any():
+            raise UserError(
+                f"candidate {far.argmax()}: the object is {from_m[far.argmax()]:.0f} m away: give "
+                "it and `camera_pose` in metres, not millimetres"
+            )
+        warnings += not_seeing(poses, camera, position / 1000, in_base=in_base)
     targets, is_away = _straight_targets(poses, place, straightened)
     if n_away := int(is_away.sum()):
         warnings.append(
@@ -293,7 +304,7 @@ def recommend_camera(
         in_base=in_base,
         warnings=tuple(warnings),
         helps=bool(cost[ranked[0]] < HELPFUL * now.error_deg),
-        no_flips=not errors.is_flip.any(),
+        no_flips=not errors.is_flip.any() and len(set(now.votes.tolist())) == 1,
     )
 
 
@@ -332,6 +343,14 @@ def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:
     return np.array(scores) if scores else None
 
 
+def scores_of_all(scores: Array | None) -> Array | None:
+    """Return the scores (n,) of calibration pairs if every pair has one; BOP's for none is none."""
+    if scores is None or not np.isfinite(scores).all():
+        return None
+    is_none = scores == NO_SCORE
+    return None if is_none.any() and (scores[~is_none] >= 0).all() else scores
+
+
 def known_scores(
     estimates: Sequence[PoseEstimate], calibrated: Array | None
 ) -> tuple[Sequence[PoseEstimate], list[str]]:
@@ -344,12 +363,15 @@ def known_scores(
     if calibrated is None:
         return estimates, []
     low, high = calibrated.min(), calibrated.max()
-    margin = (high - low) / 2
-    least, most = (0, 1) if low >= 0 and high <= 1 else (low - margin, high + margin)
-    odd = [e.score for e in estimates if e.score is not None and not least <= e.score <= most]
+    margin, is_share = (high - low) / 2, 0 <= low <= high <= 1
+    odd = [
+        score
+        for score in (e.score for e in estimates if e.score is not None)
+        if not low - margin <= score <= high + margin or (low > 1 if 0 <= score <= 1 else is_share)
+    ]
     return estimates, [
         f"the score {score:g} is far from those of calibration, {low:g} to {high:g}: is it of "
-        "another scale, such as a logit?"
+        "another scale, such as a logit, or the estimate worse than those?"
         for score in odd[:1]
     ]
 
@@ -376,17 +398,6 @@ def _straight_targets(
         return from_base, np.zeros(len(poses), dtype=bool)
     position = (from_base @ (place - poses[:, :3, 3])[:, :, None])[..., 0]
     behind = position[:, 2] <= 0
-    if behind.sum() > len(behind) / 2:
-        raise UserError(
-            f"candidate {behind.argmax()}: the object is behind this camera: give poses of the "
-            "optical frame (z forward) in the base frame, camera to base, in metres"
-        )
-    away = np.linalg.norm(position, axis=1)
-    if (far := away > FARTHEST_M).any():
-        raise UserError(
-            f"candidate {far.argmax()}: the object is {away[far.argmax()]:.0f} m away: give camera "
-            "poses in metres, not millimetres"
-        )
     position[behind] = [0, 0, 1]
     return along_ray(position) @ from_base if straightened else from_base, behind
 

@@ -28,12 +28,12 @@ from nbv.poses import AnyPose
 from nbv.tables.detections import Detections
 from nbv.tables.next_camera import (
     MOST_VIEWS,
-    NO_SCORE,
     CameraRecommendation,
     PoseEstimate,
     known_scores,
     nearest_twin,
     recommend_camera,
+    scores_of_all,
 )
 
 FLIP_DEG = OrientationErrors.flip_deg
@@ -71,7 +71,7 @@ class OrientationTable:
     estimate, truth : ndarray (n, 3, 3)
         Poses, object to camera.
     score : ndarray (n,), optional
-        The estimator's scores; unused where one is NaN.
+        The estimator's scores; unused where one is NaN, or -1, BOP's for none.
     straightened : bool
         Whether poses were rotated onto the optical axis (positions known).
     symmetries : mapping
@@ -133,8 +133,10 @@ class OrientationTable:
         known = self.object_ids
         if object_id is None and len(known) > 1:
             choices = ", ".join(sorted(known, key=by_number))
-            raise UserError(f"the table has {len(known)} objects; name one of {choices}")
-        name = known[0] if object_id is None else object_id
+            raise UserError(
+                f"the table has {len(known)} objects; give `object_id`, one of {choices}"
+            )
+        name = known[0] if object_id is None else str(object_id)
         if name not in known:
             raise UserError(f"object {name} is not in the table: {nearest(name, known)}")
         return name
@@ -142,14 +144,6 @@ class OrientationTable:
     def errors(self, object_id: str | None = None) -> OrientationErrors:
         """Return the errors on an object; its name and errors are those of `name_of`."""
         return self._errors[self.name_of(object_id)]
-
-    @property
-    def _scores(self) -> Array | None:
-        """Scores (n,), if every pair has one; BOP's for none is no score."""
-        score = self.score
-        if score is None or not np.isfinite(score).all() or (score == NO_SCORE).all():
-            return None
-        return score
 
     @cached_property
     def _errors(self) -> dict[str, OrientationErrors]:
@@ -166,7 +160,7 @@ class OrientationTable:
         }
         flips = np.concatenate([each.is_flip for each in errors.values()])
         share, ratio = (flips.sum() + 0.5) / (len(flips) + 1), None
-        if (known := self._scores) is not None:
+        if (known := scores_of_all(self.score)) is not None:
             scores = np.concatenate([known[k] for k in rows.values()])
             ratio = ScoreRatio.fit(scores, flips)
         strength = shrinkage(list(errors.values()))
@@ -234,7 +228,12 @@ class OrientationTable:
         (False, True)
         """
         name = self.name_of(object_id)
-        estimates, doubts = known_scores(estimates, self._scores)
+        given: Any = estimates
+        if not (isinstance(given, Sequence) and all(isinstance(e, PoseEstimate) for e in given)):
+            raise UserError("`estimates`: give a list of PoseEstimate")
+        if isinstance(candidates, float):
+            raise UserError(f"`candidates`={candidates:g}: give camera poses, or an integer")
+        estimates, doubts = known_scores(estimates, scores_of_all(self.score))
         answer = recommend_camera(
             self.errors(name),
             estimates,
@@ -247,13 +246,13 @@ class OrientationTable:
         score = min((each.score for each in estimates if each.score is not None), default=None)
         last, pose = estimates[-1], cast(Any, camera_pose)
         last = last if pose is None else replace(last, camera_pose=pose)
-        given = dict.fromkeys(text for each in estimates for text in each.warnings)
+        of_poses = dict.fromkeys(text for each in estimates for text in each.warnings)
         return replace(
             answer,
             rotation=nearest_twin(answer.rotation, self.symmetry(name), last.camera_pose, previous),
             holds_where=detections.holds_where(score),
             bounds_deg=self._bounds_deg(name, estimates, answer.decision.verdict),
-            warnings=(*answer.warnings, *doubts, *given, *detections.warnings(score)),
+            warnings=(*answer.warnings, *doubts, *of_poses, *detections.warnings(score)),
             frame_id=last.frame_id if last.camera_pose is None else last.base_frame_id,
             camera_frame_id=last.frame_id,
         )

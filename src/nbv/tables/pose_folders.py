@@ -30,7 +30,9 @@ def read_pose_folders(
     other parameters are those of `nbv.tables.bop.read_orientation_table`. A UserError names the
     file.
     """
-    if truth is None or not truth.is_dir() or len(objects) > 1 or (models_info and not objects):
+    if truth is not None and not truth.is_dir():
+        raise UserError(f"`ground_truth`={truth} is no folder; give a folder of poses")
+    if truth is None or len(objects) > 1 or (models_info and not objects):
         raise UserError(
             f"{folder} is a folder: give `ground_truth`, a folder with the true pose of each frame "
             "in a file of the same name, and with `models_info` the name of its `object`"
@@ -78,11 +80,13 @@ def _files(folder: Path) -> dict[Path, Path]:
 
 def _pose(file: Path) -> GivenPose | None:
     """Return the pose in a file; None for what estimators write for no pose."""
+    if not file.stat().st_size:
+        return None
     (name, given), *others = read_entries(file, "")
     if others:
         raise UserError(f"{file} holds {1 + len(others)} poses; give one for each frame")
     if isinstance(given, np.ndarray) and (
-        np.isnan(given).any() or np.array_equal(given, np.eye(4).ravel())
+        np.isnan(given).any() or not given.any() or np.array_equal(given, np.eye(4).ravel())
     ):
         return None
     return as_given(given, name)

@@ -191,13 +191,17 @@ def test_a_turn_that_is_no_part_of_a_whole_one_is_no_symmetry():
         Symmetry.from_bop({"symmetries_discrete": bop([0, 0, 119.5])})
 
 
-def test_one_axis_need_be_no_list():
+def test_one_symmetry_need_be_no_list_and_may_be_there_twice():
     (axis,) = freely([0, 2, 0])
-    assert Symmetry.from_bop({"symmetries_continuous": axis}).axis.tolist() == [0, 1, 0]
+    for axes in (axis, [axis, axis]):
+        assert Symmetry.from_bop({"symmetries_continuous": axes}).axis.tolist() == [0, 1, 0]
+    matrix = np.diag([-1.0, -1, 1, 1])
+    for given in (matrix.tolist(), matrix.ravel().tolist(), [matrix.tolist()]):
+        assert len(Symmetry.from_bop({"symmetries_discrete": given}).discrete) == 2
 
 
 @pytest.mark.parametrize(
-    "key", ["symmetry_discrete", "Symmetries_continuous", "symetries_discrete"]
+    "key", ["symmetry_discrete", "Symmetries_continuous", "symetries_discrete", "discrete"]
 )
 def test_a_misspelt_key_is_named(key):
     with pytest.raises(UserError, match=f"'{key}' is no key of BOP: give symmetries_discrete"):

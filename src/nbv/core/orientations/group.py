@@ -8,7 +8,7 @@ Arrays of orientations are (..., 3, 3) float64.
 
 from __future__ import annotations
 
-import difflib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -101,22 +101,22 @@ class Symmetry:
 
         An entry without `SYMMETRIES` is asymmetric. A discrete symmetry by nearly the n-th part of
         a turn, such as one with three decimals, is taken to be by exactly that. Raise UserError if
-        a key is nearly one of `SYMMETRIES`, a symmetry is no rotation, the rotations form no group
+        a key is like one of `SYMMETRIES`, a symmetry is no rotation, the rotations form no group
         of a solid, or the object has more than one axis of continuous symmetry.
         """
         for key in entry:
-            is_like = "sym" in key.lower() or difflib.get_close_matches(key, SYMMETRIES, 1)
-            if key not in SYMMETRIES and is_like:
+            if key not in SYMMETRIES and re.search("sym|discrete|continuous", key.lower()):
                 raise UserError(f"{key!r} is no key of BOP: give {' or '.join(SYMMETRIES)}")
         generators = []
-        for matrix in entry.get("symmetries_discrete", ()):
+        given = entry.get("symmetries_discrete", ())
+        for matrix in [given] if np.size(given) == 16 else given:
             if np.size(matrix) != 16:
                 raise UserError("symmetries_discrete has a matrix without 16 numbers")
             corner = np.reshape(matrix, (4, 4))[:3, :3]
             generators.append(_n_fold(as_orientations(corner, "a matrix of symmetries_discrete")))
         axes = entry.get("symmetries_continuous", ())
         axes = [axes] if isinstance(axes, Mapping) else axes
-        if len(axes) > 1:
+        if any(each.get("axis") != axes[0].get("axis") for each in axes[1:]):
             raise UserError(
                 "symmetries_continuous has more than one axis: a sphere has no orientation"
             )
