@@ -229,12 +229,17 @@ def label_rows(axes: Axes, labels: Sequence[str], headings: Sequence[int]) -> No
     axes.grid(visible=False, axis="y")
 
 
+def saved_as(figure: Figure, kind: str) -> bytes:
+    """Return a figure's file of a kind of `SAVED`, always the same for the same figure."""
+    with mpl.rc_context(RC), io.BytesIO() as file:
+        figure.savefig(file, format=kind, **SAVED[kind])
+        return file.getvalue()
+
+
 def save_figure(figure: Figure, paths: Mapping[str, Path]) -> None:
     """Write a figure reproducibly as ``png`` (150 dpi), ``pdf`` or ``svg``."""
-    with mpl.rc_context(RC):
-        for kind, path in paths.items():
-            # In memory first, because matplotlib's PDF writer has no clear message for a full disk.
-            whole = io.BytesIO()
-            figure.savefig(whole, format=kind, **SAVED[kind])
-            with replacing(path) as temporary:
-                temporary.write_bytes(whole.getvalue())
+    for kind, path in paths.items():
+        # In memory first, because matplotlib's PDF writer has no clear message for a full disk.
+        whole = saved_as(figure, kind)
+        with replacing(path) as temporary:
+            temporary.write_bytes(whole)

@@ -104,12 +104,11 @@ if PLAN.linear:
             features="<results>/features/{category}/el{elevation}.npy",
             objects="<results>/depth/{category}/el{elevation}_objects.json",
         output:
-            **estimates_of_fold(TRAINING),
-            estimator=f"{TRAINING}/estimators/{FOLD}/estimator.safetensors",
+            **fits_of_folds(TRAINING),
         log:
-            "<logs>/replicate_fit/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}/fold{fold}.log",
+            "<logs>/replicate_fit/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}.log",
         benchmark:
-            "<benchmarks>/replicate_fit/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}/fold{fold}.tsv"
+            "<benchmarks>/replicate_fit/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}.tsv"
 
 
 rule keep_estimates:

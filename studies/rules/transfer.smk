@@ -84,38 +84,26 @@ use rule lookup from paper as transfer_lookup with:
         "<benchmarks>/transfer/lookup/{trained}/{tested}/{category}/el{elevation}/fold{fold}/{criterion}.tsv"
 
 
-use rule evaluate_baselines from paper as transfer_baselines with:
+use rule evaluate from paper as transfer_evaluate with:
     input:
-        code=sources("evaluate_baselines"),
+        code=sources("evaluate_methods"),
         splits="<results>/splits/{category}.csv",
         test="<results>/transfer/{trained}/{tested}/estimates/{category}/el{elevation}/fold{fold}/test.csv",
+        lookups=expand(
+            "<results>/transfer/{trained}/{tested}/lookup/{category}/el{elevation}/fold{fold}/{criterion}.npz",
+            criterion=PLAN.lookup_criteria,
+            allow_missing=True,
+        ),
     output:
         expand(
             "<results>/transfer/{trained}/{tested}/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
-            method=PLAN.baseline_methods,
+            method=METHODS,
             allow_missing=True,
         ),
     log:
-        "<logs>/transfer/evaluate_baselines/{trained}/{tested}/{category}/el{elevation}/fold{fold}.log",
+        "<logs>/transfer/evaluate/{trained}/{tested}/{category}/el{elevation}/fold{fold}.log",
     benchmark:
-        "<benchmarks>/transfer/evaluate_baselines/{trained}/{tested}/{category}/el{elevation}/fold{fold}.tsv"
-
-
-use rule evaluate_recommended from paper as transfer_recommended with:
-    input:
-        code=sources("evaluate_recommended"),
-        splits="<results>/splits/{category}.csv",
-        test="<results>/transfer/{trained}/{tested}/estimates/{category}/el{elevation}/fold{fold}/test.csv",
-        lookup=lambda wildcards: (
-            "<results>/transfer/{trained}/{tested}/lookup/{category}/el{elevation}/fold{fold}/"
-            f"{METHODS[wildcards.method]['policy']}.npz"
-        ),
-    output:
-        "<results>/transfer/{trained}/{tested}/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
-    log:
-        "<logs>/transfer/evaluate_recommended/{trained}/{tested}/{category}/el{elevation}/fold{fold}/{method}.log",
-    benchmark:
-        "<benchmarks>/transfer/evaluate_recommended/{trained}/{tested}/{category}/el{elevation}/fold{fold}/{method}.tsv"
+        "<benchmarks>/transfer/evaluate/{trained}/{tested}/{category}/el{elevation}/fold{fold}.tsv"
 
 
 rule transfer_table:

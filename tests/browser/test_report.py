@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from nbv.experiment.plan import too_small
-from nbv.experiment.report.figures import build_figure
+from nbv.experiment.report.figures.build import build_figure
 from nbv.experiment.report.page import build_report
 from nbv.experiment.report.tables import TABLES
 from reports import figure_inputs, report_files

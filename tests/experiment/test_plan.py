@@ -30,8 +30,7 @@ def test_a_plan_of_two_categories_and_two_folds():
     assert plan.lowest_units == [("mug", 15), ("chair", 0)]
     assert plan.folds_of([("mug", 30)]) == [("mug", 30, 1), ("mug", 30, 2)]
     assert {name: len(ids) for name, ids in plan.objects.items()} == {"mug": 8, "chair": 8}
-    assert set(plan.lookup_methods) | set(plan.baseline_methods) == set(plan.config["methods"])
-    assert plan.lookup_methods == ["proposed"]
+    assert plan.lookup_criteria == ["pose_ambiguity"]
     assert plan.lookup_criteria == ["pose_ambiguity"]
     methods = list(plan.config["methods"])
     expected = [("mug", 15, fold, name) for name in methods for fold in (1, 2)]
@@ -69,7 +68,7 @@ def test_cross_fitting_trains_on_parts_and_in_fewer_epochs():
     ],
 )
 def test_every_job_of_a_run_is_counted(overrides, rules):
-    always = {"splits": 2, "lookup": 4, "evaluate_baselines": 4, "evaluate_recommended": 4}
+    always = {"splits": 2, "lookup": 4, "evaluate": 4}
     expected = {"meshes": 2, "render": 2, "train": 4} | always | rules
     expected |= {"table": 7, "figure": len(FIGURES), "claims": 1, "settings": 1}
     jobs = plan_of(*overrides).jobs(TABLES, FIGURES)

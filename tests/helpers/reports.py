@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 import synthetic
 from nbv.experiment.explorer import ExplorerInputs
 from nbv.experiment.paper.verdicts import evaluate_claims
-from nbv.experiment.report.figures import FIGURES, FigureInputs
+from nbv.experiment.report.figures import FIGURES
+from nbv.experiment.report.figures.inputs import FigureInputs
 from nbv.experiment.report.runtime import load_jobs, runtime_table
 from nbv.experiment.report.settings import ReportSettings
 from nbv.experiment.report.table import write_table

@@ -63,9 +63,8 @@ def test_the_example_adds_a_method_to_the_leaderboard_and_trains_nothing(scratch
     program, *arguments = command.split()
     assert program == "snakemake"
     assert scratch.would_run(targets=tuple(arguments[2:])) == {
-        "evaluate_baselines": 4,
         "lookup": 4,
-        "evaluate_recommended": 4,
+        "evaluate": 4,
         "evaluate_extensions": 4,
         "leaderboard": 1,
     }

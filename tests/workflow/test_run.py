@@ -81,9 +81,8 @@ def test_another_bandwidth_and_an_object_less_rerun_what_follows(finished):
         "render": 1,
         "splits": 1,
         "train": 2,
-        "evaluate_baselines": 2,
         "lookup": 4,
-        "evaluate_recommended": 4,
+        "evaluate": 4,
         "settings": 1,
         **SHOWN,
     }
@@ -95,8 +94,7 @@ def test_another_training_length_reruns_training_and_what_follows(finished):
     assert finished.would_run(*changed) == {
         "train": 4,
         "lookup": 4,
-        "evaluate_baselines": 4,
-        "evaluate_recommended": 4,
+        "evaluate": 4,
         "settings": 1,
         **SHOWN,
     }
@@ -124,9 +122,8 @@ def test_an_edit_reruns_what_runs_that_code_and_what_follows(scratch):
     assert scratch.would_run() == {"settings": 1, **SHOWN}
     criteria.write_text(criteria.read_text() + "\n\nEDITED = True\n")
     assert scratch.would_run() == {
-        "evaluate_baselines": 4,
         "lookup": 4,
-        "evaluate_recommended": 4,
+        "evaluate": 4,
         "settings": 1,
         **SHOWN,
     }

@@ -66,7 +66,6 @@ wildcard_constraints:
     elevation=ELEVATIONS,
     fold=FOLDS,
     part="|".join(map(str, PLAN.parts)) or "none",
-    method="|".join(map(re.escape, PLAN.lookup_methods)) or "none",
     criterion="|".join(PLAN.lookup_criteria) or "none",
 
 
@@ -100,6 +99,16 @@ def estimates_of_fold(below="<results>"):
         if CONFIG["gives_distributions"]
     }
     return posteriors | {role: f"{folder}/{role}.csv" for role in ESTIMATED_ROLES}
+
+
+def fits_of_folds(below="<results>"):
+    """The estimates and the linear estimators of all folds, by name."""
+    folder = f"{below}/estimators/{{category}}/el{{elevation}}/fold{{fold}}"
+    files = {"estimator": f"{folder}/estimator.safetensors"} | estimates_of_fold(below)
+    return {
+        name: expand(path, fold=PLAN.folds, allow_missing=True)
+        for name, path in files.items()
+    }
 
 
 def estimates_of_training(below="<results>"):

@@ -1,4 +1,4 @@
-# Linear estimators: the depth features of a unit's images, and a fit for each fold.
+# Linear estimators: the depth features of a unit's images, and the fits of its folds in one job.
 
 
 rule extract:
@@ -29,16 +29,18 @@ rule fit:
         features="<results>/features/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",
     output:
-        **estimates_of_fold(),
-        estimator="<results>/estimators/{category}/el{elevation}/fold{fold}/estimator.safetensors",
+        **fits_of_folds(),
     log:
-        "<logs>/fit/{category}/el{elevation}/fold{fold}.log",
+        "<logs>/fit/{category}/el{elevation}.log",
     benchmark:
-        "<benchmarks>/fit/{category}/el{elevation}/fold{fold}.tsv"
+        "<benchmarks>/fit/{category}/el{elevation}.tsv"
     priority: 50
     conda:
         ENVIRONMENT
+    resources:
+        runtime=per_attempt(30),
     params:
+        folds=list(PLAN.folds),
         estimator=CONFIG["estimator"],
         mirror_plane_deg=lambda wildcards: PLAN.mirror_plane_deg(wildcards.category),
     script:

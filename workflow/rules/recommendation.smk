@@ -20,51 +20,35 @@ rule lookup:
         "../scripts/build_lookup.py"
 
 
-rule evaluate_baselines:
+# All methods in one job, whose start takes longer than its work.
+rule evaluate:
     input:
-        code=sources("evaluate_baselines"),
+        code=sources("evaluate_methods"),
         splits="<results>/splits/{category}.csv",
         test="<results>/estimates/{category}/el{elevation}/fold{fold}/test.csv",
+        lookups=expand(
+            "<results>/lookup/{category}/el{elevation}/fold{fold}/{criterion}.npz",
+            criterion=PLAN.lookup_criteria,
+            allow_missing=True,
+        ),
     output:
         expand(
             "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
-            method=PLAN.baseline_methods,
+            method=METHODS,
             allow_missing=True,
         ),
     log:
-        "<logs>/evaluate_baselines/{category}/el{elevation}/fold{fold}.log",
+        "<logs>/evaluate/{category}/el{elevation}/fold{fold}.log",
     benchmark:
-        "<benchmarks>/evaluate_baselines/{category}/el{elevation}/fold{fold}.tsv"
+        "<benchmarks>/evaluate/{category}/el{elevation}/fold{fold}.tsv"
     conda:
         ENVIRONMENT
     params:
-        methods={name: METHODS[name] for name in PLAN.baseline_methods},
+        methods=METHODS,
+        criteria=PLAN.lookup_criteria,
         seed=CONFIG["seed"],
     script:
-        "../scripts/evaluate_baselines.py"
-
-
-rule evaluate_recommended:
-    input:
-        code=sources("evaluate_recommended"),
-        splits="<results>/splits/{category}.csv",
-        test="<results>/estimates/{category}/el{elevation}/fold{fold}/test.csv",
-        lookup=lambda wildcards: (
-            "<results>/lookup/{category}/el{elevation}/fold{fold}/"
-            f"{METHODS[wildcards.method]['policy']}.npz"
-        ),
-    output:
-        "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
-    log:
-        "<logs>/evaluate_recommended/{category}/el{elevation}/fold{fold}/{method}.log",
-    benchmark:
-        "<benchmarks>/evaluate_recommended/{category}/el{elevation}/fold{fold}/{method}.tsv"
-    conda:
-        ENVIRONMENT
-    params:
-        method=lambda wildcards: METHODS[wildcards.method],
-    script:
-        "../scripts/evaluate_recommended.py"
+        "../scripts/evaluate_methods.py"
 
 
 rule lookups:

@@ -1,4 +1,4 @@
-"""Fit the linear estimator of one fold to depth features, and estimate held-out objects."""
+"""Fit the linear estimator of each fold to depth features, and estimate held-out objects."""
 
 from nbv.experiment.run.jobs import job
 
@@ -10,16 +10,13 @@ with job(snakemake):
     from nbv.files import open_array, read_json
 
     given, output, params = snakemake.input, snakemake.output, snakemake.params
-    splits, fold = read_splits(given.splits), int(snakemake.wildcards.fold)
-    fitted, outputs = fit_fold(
-        open_array(given.features),
-        read_json(given.objects),
-        splits,
-        fold,
-        params.estimator,
-        params.mirror_plane_deg,
-    )
-    trained_on = objects_with_role(splits, fold, *training_roles(splits))
-    fitted.save(output.estimator, params.estimator, trained_on)
-    distributions = bool(output.get("test_posteriors"))
-    write_fold(output, estimates_of(outputs, distributions=distributions))
+    splits, object_ids = read_splits(given.splits), read_json(given.objects)
+    features = open_array(given.features)
+    settings, plane = params.estimator, params.mirror_plane_deg
+    for place, fold in enumerate(params.folds):
+        fitted, outputs = fit_fold(features, object_ids, splits, fold, settings, plane)
+        trained_on = objects_with_role(splits, fold, *training_roles(splits))
+        fitted.save(output.estimator[place], settings, trained_on)
+        distributions = bool(output.get("test_posteriors"))
+        files = {name: of_folds[place] for name, of_folds in output.items()}
+        write_fold(files, estimates_of(outputs, distributions=distributions))

@@ -5,7 +5,8 @@ from pathlib import Path
 from nbv.experiment.run.jobs import job
 
 with job(snakemake):
-    from nbv.experiment.report.figures import FigureInputs, build_figure
+    from nbv.experiment.report.figures.build import build_figure
+    from nbv.experiment.report.figures.inputs import FigureInputs
     from nbv.experiment.report.figures.steps import save_animation
     from nbv.experiment.report.settings import ReportSettings
     from nbv.experiment.results import load_evaluations

@@ -133,20 +133,10 @@ class Plan:
         return [(*unit, fold, name) for unit in units for name in methods for fold in self.folds]
 
     @property
-    def lookup_methods(self) -> list[str]:
-        """The paper's methods that need a lookup table."""
-        methods = self.config["methods"]
-        return [name for name, method in methods.items() if needs_lookup(method["policy"])]
-
-    @property
-    def baseline_methods(self) -> list[str]:
-        """The paper's methods that need none."""
-        return [name for name in self.config["methods"] if name not in self.lookup_methods]
-
-    @property
     def lookup_criteria(self) -> list[str]:
         """The criteria of the lookup tables, sorted."""
-        return sorted({self.config["methods"][name]["policy"] for name in self.lookup_methods})
+        policies = {method["policy"] for method in self.config["methods"].values()}
+        return sorted(filter(needs_lookup, policies))
 
     @property
     def lookups(self) -> list[tuple[str, int, int, str]]:
@@ -325,14 +315,11 @@ class Plan:
             "pretrain_part": [f"fold{k}/{part}" for k in pretrained for part in parts],
             "extract": paths("{category}/el{elevation}", units if self.linear else ()),
             "train": [] if self.linear else paths(fold, trained),
-            "fit": paths(fold, trained) if self.linear else [],
+            "fit": paths("{category}/el{elevation}", units if self.linear else ()),
             "train_part": [f"{path}/{k}" for path in paths(fold, folds) for k in parts],
             "estimate": paths(fold, estimated),
             "lookup": paths(f"{fold}/{{criterion}}", self.lookups),
-            "evaluate_baselines": paths(fold, folds),
-            "evaluate_recommended": [
-                f"{path}/{name}" for path in paths(fold, folds) for name in self.lookup_methods
-            ],
+            "evaluate": paths(fold, folds),
             "table": tables,
             "figure": figures,
         }

@@ -13,8 +13,9 @@ import synthetic
 from nbv.core.circle.angles import circular_distance_deg
 from nbv.core.circle.evidence import gather_evidence
 from nbv.errors import UserError
-from nbv.experiment.report.figures import FIGURES, FigureInputs, build_figure, steps
-from nbv.experiment.report.figures.inputs import example_view
+from nbv.experiment.report.figures import FIGURES, steps
+from nbv.experiment.report.figures.build import build_figure
+from nbv.experiment.report.figures.inputs import FigureInputs, example_view
 from nbv.experiment.report.figures.views import depth_limits, shade
 from nbv.experiment.report.settings import ReportSettings, hardest_azimuth_deg
 from nbv.style import save_figure

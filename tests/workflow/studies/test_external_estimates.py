@@ -98,7 +98,7 @@ def test_nothing_is_rendered_or_trained(foreign) -> None:
     assert not present & {"meshes", "depth", "estimators"}
     jobs = foreign.would_run(*FOREIGN[len(TINY) :], "categories=[mug]")
     assert jobs["report"] == 1
-    assert not jobs.keys() & {"meshes", "render", "train", "evaluate_baselines"}
+    assert not jobs.keys() & {"meshes", "render", "train", "evaluate"}
 
 
 def test_what_needs_images_or_trainings_is_refused_before_anything_runs(foreign) -> None:

@@ -9,7 +9,6 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -60,14 +59,11 @@ _VERDICTS: Mapping[Verdict, tuple[str, str, str]] = {
 
 @dataclass(frozen=True)
 class _Decided:
-    """A claim with its verdict, and how far its deciding comparison favours it.
-
-    `text` states the result where there is no interval.
-    """
+    """A claim, its verdict, and how far its deciding comparison favours it, or that in words."""
 
     title: str
     verdict: Verdict
-    favour: Interval | None
+    favour: Interval
     text: str = ""
 
 
@@ -97,7 +93,12 @@ def claims_forest(judged: pd.DataFrame) -> Figure:
         labels.append(f"{words}: {len(members)}")
         axes.plot(0, len(labels) - 1, linestyle="none")
         for claim in members:
-            _draw_decided(axes, claim, len(labels), color, marker)
+            (value, low, high), row = claim.favour, len(labels)
+            if claim.text:
+                beside: Any = {"textcoords": "offset points", "va": "center", "fontsize": 8}
+                axes.annotate(claim.text, (value, row), (5, 0), **beside)
+            axes.plot([low, high], [row, row], color=color, linewidth=1.6)
+            axes.plot(value, row, marker=marker, color=color, markersize=5.5)
             labels.append(claim.title)
     # Where there is more room: half of the axes is enough.
     right = sum(axes.get_xlim()) > 0
@@ -110,18 +111,6 @@ def claims_forest(judged: pd.DataFrame) -> Figure:
         axes.get_yticklabels()[row].set_color(color)
     axes.set_xlabel(f"{MINUS} against the claim     for it +\n(degrees, or points of pAUC)")
     return figure
-
-
-def _draw_decided(axes: Axes, claim: _Decided, row: int, color: str, marker: str) -> None:
-    if claim.favour is None:
-        axes.annotate(
-            claim.text, (0, row), (5, 0), textcoords="offset points", va="center", fontsize=8
-        )
-        axes.plot(0, row, marker=marker, color=color, markersize=5.5)
-        return
-    value, low, high = claim.favour
-    axes.plot([low, high], [row, row], color=color, linewidth=1.6)
-    axes.plot(value, row, marker=marker, color=color, markersize=5.5)
 
 
 @mpl.rc_context(RC)
@@ -146,7 +135,8 @@ def claim_figure(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> Figure:
         axes.axvspan(-margin, margin, color=SHADE, linewidth=0)
     for difference in drawn:
         row = labels.index(difference.name if single_group else difference.group)
-        offset = 0.0 if single_group else _offset(list(series).index(difference.name), per_row)
+        place = list(series).index(difference.name) - (per_row - 1) / 2
+        offset = 0.0 if single_group else place * 0.75 / per_row
         style = method_style(difference.method, METHODS)
         draw_estimate(axes, row + offset, style, difference.ours, difference.published)
     axes.axvline(0, color=INK, linewidth=0.9)
@@ -200,7 +190,7 @@ def _decided(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> _Decided:
     verdict = rows[part]["verdict"]
     if isinstance(part, FreeOfOutliers):
         text = f"{number(rows[part]['value'], 0)} % outliers"
-        return _Decided(claim.title, verdict, None, text)
+        return _Decided(claim.title, verdict, (0.0, 0.0, 0.0), text)
     return _Decided(claim.title, verdict, statements.favour_of(part, rows[part]))
 
 
@@ -283,10 +273,6 @@ def _labels(statement: Statement, label: str = "") -> Iterator[tuple[Comparison,
             yield from _labels(part, statement.label or label)
     else:
         yield statement, label
-
-
-def _offset(index: int, n: int) -> float:
-    return (index - (n - 1) / 2) * 0.75 / n
 
 
 def _key(difference: _Difference) -> Line2D:

@@ -1,19 +1,16 @@
 """The report: one HTML page with tables, claims, figures, settings and running time.
 
-It needs no other file: figures are embedded as SVG in the page's colours. Without scripts, it lacks
-the button that opens all claims.
+It needs no other file. Without scripts, it lacks the button that opens all claims.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from markupsafe import Markup
@@ -43,12 +40,11 @@ from nbv.experiment.report.forest import (
     table_picture,
 )
 from nbv.experiment.report.table import HTML
-from nbv.experiment.report.tables import TABLES
 from nbv.experiment.results import load_object_ids
 from nbv.experiment.statistics.paired import UNIT_OF
-from nbv.files import existing, read_csv, read_json, readable
+from nbv.files import existing, read_csv, read_json
 from nbv.labels import category_label, interval_text, number
-from nbv.style import AGAINST, FOR, GRID, INK, MUTED, OPEN, RC, SAVED, SHADE
+from nbv.style import AGAINST, FOR, GRID, INK, MUTED, OPEN, SHADE, saved_as
 
 _COLOURS: Mapping[str, str] = {
     INK: "var(--ink)",
@@ -69,9 +65,7 @@ _NAMED = re.compile(r"(?<=url\(#)")
 
 def svg_text(figure: Figure) -> str:
     """Return a figure as the text of an SVG file, always the same for the same figure."""
-    with mpl.rc_context(RC), BytesIO() as file:
-        figure.savefig(file, format="svg", **SAVED["svg"])
-        return file.getvalue().decode("utf-8")
+    return saved_as(figure, "svg").decode("utf-8")
 
 
 def inline_svg(text: str, name: str, label: str) -> Markup:
@@ -170,10 +164,9 @@ def build_report(
     splits : mapping of category to path
         The files of all categories in the configuration.
     tables : mapping of name to path
-        HTML fragments of `nbv.experiment.report.table.write_table`, in the order of the page. The
-        page lists the paper's tables that are absent.
+        HTML fragments of `nbv.experiment.report.table.write_table`, in the order of the page.
     figures : mapping of name to path
-        SVG files, in the order of the page.
+        SVG files, in the order of the page, which names those that are absent.
     runtime : path
         HTML fragment of `nbv.experiment.report.runtime.runtime_table`.
     docs : str
@@ -192,14 +185,14 @@ def build_report(
     rows = comparisons_of(judged)
     settings = read_configuration(existing(configuration).parent, ("density", "estimator"))
     made_with = read_json(provenance)
-    shown = {name: _figure(name, path) for name, path in figures.items()}
+    shown = [_figure(name, FIGURES[name].caption, _text(path)) for name, path in figures.items()]
     return HTML.get_template("page.html.j2").render(
         title=f"Best next viewpoint: experiment {settings['name']}",
         caution=caution,
         finding=_finding(rows, bool(caution)),
         opening=[
             *_opening(judged, read_csv(table1)),
-            *(figure for name, figure in shown.items() if name == _OPENING),
+            *(figure for figure in shown if figure["name"] == _OPENING),
         ],
         left_open=_left_open(settings["density"]),
         docs=docs,
@@ -211,13 +204,13 @@ def build_report(
         tally=_tally(each["verdict"]),
         point_tally=_tally(run["point_verdict"]),
         verdict_rules=VERDICT_RULES,
-        tables={name: _fragment(path) for name, path in tables.items()},
-        absent_tables=[name for name in TABLES if name not in tables],
-        figures=[figure for name, figure in shown.items() if name != _OPENING],
+        # `write_table` has escaped them.
+        tables={name: Markup(_text(path)) for name, path in tables.items()},
+        runtime=Markup(_text(runtime)),
+        figures=[figure for figure in shown if figure["name"] != _OPENING],
         absent_figures=[name for name in FIGURES if name not in figures],
         machine_facts=list(_machine_facts(made_with)),
-        configuration=configuration.read_text(encoding="utf-8").strip(),
-        runtime=_fragment(runtime),
+        configuration=_text(configuration).strip(),
     )
 
 
@@ -246,7 +239,6 @@ def _finding(rows: Mapping[str, Mapping[Comparison, ClaimRow]], too_small: bool)
 def _opening(judged: pd.DataFrame, table1: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """Yield the opening pictures of the page, except for the figure of the method."""
     published = " Open: as published." if table1["published"].notna().any() else ""
-    picture = svg_text(table_picture(table1))
     caption = (
         "Table 1 as a picture. Filled: our mean absolute error (MAE) by category and method, with "
         f"its 95 % interval over objects.{published} Single is one view; the others rotate the "
@@ -254,7 +246,7 @@ def _opening(judged: pd.DataFrame, table1: pd.DataFrame) -> Iterator[dict[str, A
         "that the table proposes. All see the same objects, so their differences are known better "
         "than these intervals say."
     )
-    yield {"name": "table1-picture", "caption": caption, "svg": inline_svg(picture, "p1", caption)}
+    yield _figure("table1-picture", caption, svg_text(table_picture(table1)))
     if (judged["verdict"] != NOT_RUN).any():
         caption = (
             "The paper's claims. By how much the comparison that decides a claim favours it, with "
@@ -263,8 +255,7 @@ def _opening(judged: pd.DataFrame, table1: pd.DataFrame) -> Iterator[dict[str, A
             "where an error above 100° counts as 100. σ: standard deviation over folds. Groups: "
             "quarters of the circle of first views."
         )
-        drawn = svg_text(claims_forest(judged))
-        yield {"name": "claims-forest", "caption": caption, "svg": inline_svg(drawn, "p2", caption)}
+        yield _figure("claims-forest", caption, svg_text(claims_forest(judged)))
 
 
 def _claim(summary: ClaimRow, rows: Mapping[Comparison, ClaimRow]) -> dict[Hashable, Any]:
@@ -340,16 +331,12 @@ def _tally(verdicts: pd.Series) -> str:
     return ", ".join(parts)
 
 
-def _fragment(path: Path) -> Markup:
-    """Return HTML that `write_table` has escaped."""
-    with readable(path):
-        return Markup(path.read_text(encoding="utf-8"))
+def _text(path: Path) -> str:
+    return existing(path).read_text(encoding="utf-8")
 
 
-def _figure(name: str, path: Path) -> dict[str, Any]:
-    caption = FIGURES[name].caption
-    text = existing(path).read_text(encoding="utf-8")
-    return {"name": name, "caption": caption, "svg": inline_svg(text, name, caption)}
+def _figure(name: str, caption: str, drawn: str) -> dict[str, Any]:
+    return {"name": name, "caption": caption, "svg": inline_svg(drawn, name, caption)}
 
 
 def _comparison(part: ClaimRow) -> list[str]:
