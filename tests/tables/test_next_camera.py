@@ -192,6 +192,9 @@ def test_without_a_camera_pose_targets_are_in_the_camera(flipping):
     ):
         assert answer.frame == frame
     targets = [move.target_camera_pose for move in answer.moves]
+    behind = [target @ np.diag([1.0, -1, -1, 1]) for target in targets]
+    with pytest.raises(UserError, match="if they are in the base frame, give `camera_pose`"):
+        flipping.recommend([view], behind)
     for camera_pose, is_told in ((None, True), (np.eye(4), False)):
         told = flipping.recommend([view], targets, camera_pose=camera_pose).warnings
         assert any("give `camera_pose`" in text for text in told) == is_told
