@@ -47,8 +47,8 @@ NO_DEPENDENCE = (
 )
 
 NO_SCORES = (
-    "no scores, of the estimate or of calibration (-1 is BOP's for none): flips are hard to tell, "
-    "and a stop rests on little"
+    "no scores, of the estimate or of calibration: flips are hard to tell, and a stop rests on "
+    "little"
 )
 
 
