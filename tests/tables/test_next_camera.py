@@ -59,6 +59,8 @@ def test_the_command_takes_a_previous_pose(table, tmp_path, monkeypatch, capsys)
     np.save("previous.npy", quarter(1))
     eye = " ".join(map(str, np.eye(3).ravel()))
     options = ["next", "t.npz", "--estimate", *eye.split(), "--sphere", "9"]
+    assert main([*options[:-1], "9.5"]) == 2
+    assert "--sphere: '9.5' is not an integer" in capsys.readouterr().err
     assert main([*options, "--previous", "previous.npy"]) == 0
     assert "0.00000  -1.00000   0.00000" in capsys.readouterr().out
     np.save("camera.npy", np.eye(4))
