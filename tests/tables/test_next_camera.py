@@ -59,6 +59,8 @@ def test_the_command_takes_a_previous_pose(table, tmp_path, monkeypatch, capsys)
     np.save("previous.npy", quarter(1))
     eye = " ".join(map(str, np.eye(3).ravel()))
     options = ["next", "t.npz", "--estimate", *eye.split(), "--sphere", "9"]
+    assert main([*options[:-1], "9.5"]) == 2
+    assert "--sphere: '9.5' is not an integer" in capsys.readouterr().err
     assert main([*options, "--previous", "previous.npy"]) == 0
     assert "0.00000  -1.00000   0.00000" in capsys.readouterr().out
     np.save("camera.npy", np.eye(4))
@@ -192,6 +194,9 @@ def test_without_a_camera_pose_targets_are_in_the_camera(flipping):
     ):
         assert answer.frame == frame
     targets = [move.target_camera_pose for move in answer.moves]
+    behind = [target @ np.diag([1.0, -1, -1, 1]) for target in targets]
+    with pytest.raises(UserError, match="if they are in the base frame, give `camera_pose`"):
+        flipping.recommend([view], behind)
     for camera_pose, is_told in ((None, True), (np.eye(4), False)):
         told = flipping.recommend([view], targets, camera_pose=camera_pose).warnings
         assert any("give `camera_pose`" in text for text in told) == is_told

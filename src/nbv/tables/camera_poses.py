@@ -18,8 +18,7 @@ TURNED_DEG = 20.0
 those by less than half agree."""
 
 OFF_AXIS_DEG, ON_AXIS_DEG = 45.0, 15.0
-"""Medians of the angle between candidates' optical axes and the object: by more they do not see it;
-by less they do."""
+"""Median angles from candidates' optical axes to an object: more is a mistake, less is none."""
 
 IN_CAMERA = (
     "candidates are taken to be in the present camera's frame: if they are in the base frame, give "
@@ -78,11 +77,11 @@ def not_seeing(poses: Array, camera: Array, seen_m: Array, *, in_base: bool) -> 
     """Return a warning where most candidates (n, 4, 4) do not see the object.
 
     It is at `seen_m` (3,) in a camera (4, 4), whose pose is known if poses are `in_base`. A
-    UserError says so where the object is behind most candidates, or they see it if they, or the
-    camera's pose, are of another convention, which it names.
+    UserError says so where the object is behind most candidates, or they see it if poses of the
+    base frame are of another convention, which it names.
     """
     every = np.concatenate([poses, camera[None]])
-    is_camera = np.arange(len(every)) == len(poses)
+    is_camera = np.arange(len(every))[:, None] == len(poses)
 
     def off_deg(rotation: Orientations, origin: Array) -> tuple[Array, float]:
         rays = rotation[-1] @ seen_m + origin[-1] - origin[:-1]
@@ -98,16 +97,18 @@ def not_seeing(poses: Array, camera: Array, seen_m: Array, *, in_base: bool) -> 
         f"candidate {angles.argmax()}: the object is {angles.max():.0f}° off the optical axis, "
         f"{median_deg:.0f}° in the median of candidates"
     )
-    whose = {"candidates are": ~is_camera}
-    if in_base:
-        whose |= {"`camera_pose` is": is_camera, "they and `camera_pose` are": is_camera | True}
-    for name, *others in _conventions(every):
+    whose = {
+        "candidates are": ~is_camera,
+        "`camera_pose` is": is_camera,
+        "they and `camera_pose` are": is_camera | True,
+    }
+    for name, turned, moved in _conventions(every) if in_base else ():
         for who, of in whose.items():
-            turned, moved = others
-            turned = np.where(of[:, None, None], turned, rotation)
-            if off_deg(turned, np.where(of[:, None], moved, origin))[1] < ON_AXIS_DEG:
+            mixed = np.where(of[:, None], turned, rotation), np.where(of, moved, origin)
+            if off_deg(*mixed)[1] < ON_AXIS_DEG:
                 raise UserError(f"{what}; it is near the axis if {who} {name}: {RIGHT}")
     told = f"{what}: do they see it, and is `camera_pose` right? {RIGHT}"
+    told = told if in_base else f"{what}; {IN_CAMERA}"
     if median_deg >= 90:
         raise UserError(told)
     return [told]

@@ -47,8 +47,8 @@ NO_DEPENDENCE = (
 )
 
 NO_SCORES = (
-    "no scores, of the estimate or of calibration (-1 is BOP's for none): flips are hard to tell, "
-    "and a stop rests on little"
+    "no scores, of the estimate or of calibration: flips are hard to tell, and a stop rests on "
+    "little"
 )
 
 
@@ -364,11 +364,9 @@ def known_scores(
         return estimates, []
     low, high = calibrated.min(), calibrated.max()
     margin, is_share = (high - low) / 2, 0 <= low <= high <= 1
-    odd = [
-        score
-        for score in (e.score for e in estimates if e.score is not None)
-        if not low - margin <= score <= high + margin or (low > 1 if 0 <= score <= 1 else is_share)
-    ]
+    scores = np.array([e.score for e in estimates if e.score is not None])
+    is_other = np.where((scores >= 0) & (scores <= 1), low > 1, is_share)
+    odd = scores[(scores < low - margin) | (scores > high + margin) | is_other]
     return estimates, [
         f"the score {score:g} is far from those of calibration, {low:g} to {high:g}: is it of "
         "another scale, such as a logit, or the estimate worse than those?"
