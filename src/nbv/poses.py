@@ -24,12 +24,13 @@ Source = str | Path | Sequence[float]
 """A file, or the numbers of an option."""
 
 FORMS = (
-    "give a 3 × 3 or 4 × 4 matrix row by row, a position with a quaternion, BOP's cam_R_m2c and "
-    "cam_t_m2c, or a PoseStamped"
+    "give a 3 × 3 or 4 × 4 matrix row by row, a position with quaternion_xyzw or quaternion_wxyz, "
+    "BOP's cam_R_m2c and cam_t_m2c, or a PoseStamped"
 )
+IN_JSON = "JSON with position and quaternion_xyzw or quaternion_wxyz"
 _ORDER = (
-    "7 numbers are a position and a quaternion: give its order, `quaternion` xyzw or wxyz, or JSON "
-    "with position and quaternion_xyzw or quaternion_wxyz"
+    "7 numbers are a position and a quaternion: give its order, `quaternion` xyzw or wxyz, or "
+    f"{IN_JSON}"
 )
 
 _SIZES = (7, 9, 16)

@@ -66,6 +66,14 @@ def test_what_is_no_pose_is_named(example):
     with pytest.raises(UserError, match=r"000007\.txt: an array of shape \(3,\)"):
         read(example)
     shutil.rmtree(example / "ob_in_cam/000002")
+    (example / "ob_in_cam/000001/000001.txt").write_text("0 0 1 0 0 0 1")
+    with pytest.raises(UserError, match="7 numbers: give a 4 × 4 matrix, or JSON"):
+        read(example)
+    for nearest_mm in (-1, np.nan):
+        with pytest.raises(UserError, match="give a distance above 0"):
+            read(example, nearest_mm=nearest_mm)
+    with pytest.raises(UserError, match="leave `least_score` out"):
+        read(example, least_score=0.5)
     (example / "truth/000001/000000.txt").write_text("nan " * 16)
     with pytest.raises(UserError, match=r"000000\.txt holds no pose"):
         read(example)

@@ -104,7 +104,7 @@ def read_orientation_table(
         raise UserError(f"{path}: no score is {least_score:g} or more; lower `least_score`")
     if is_bop:
         given = _with_keys(path, given)
-        nearest_mm = NEAREST_MM if nearest_mm is None else nearest_mm
+        nearest_mm = nearest_or_default(nearest_mm)
         folder = path.parent if truth is None else Path(truth)
         rows, fate, missed = _matched(path, given, fate, folder, nearest_mm)
     left_out = [
@@ -177,6 +177,13 @@ def read_orientation_table(
         tuple(left_out),
         detections,
     )
+
+
+def nearest_or_default(nearest_mm: float | None) -> float:
+    """Return a distance, `NEAREST_MM` by default; raise UserError unless it is above 0."""
+    if nearest_mm is not None and not nearest_mm > 0:
+        raise UserError(f"`nearest_mm`={nearest_mm:g}: give a distance above 0, mm")
+    return NEAREST_MM if nearest_mm is None else nearest_mm
 
 
 def groups_of(rows: pd.DataFrame) -> NDArray[np.str_]:

@@ -11,8 +11,8 @@ import pandas as pd
 
 from nbv.errors import UserError
 from nbv.numbers import Array
-from nbv.poses import GivenPose, as_given, read_entries
-from nbv.tables.bop import NEAREST_MM, read_orientation_table
+from nbv.poses import IN_JSON, GivenPose, as_given, read_entries
+from nbv.tables.bop import nearest_or_default, read_orientation_table
 from nbv.tables.orientation_table import OrientationTable
 
 
@@ -37,7 +37,9 @@ def read_pose_folders(
             f"{folder} is a folder: give `ground_truth`, a folder with the true pose of each frame "
             "in a file of the same name, and with `models_info` the name of its `object`"
         )
-    nearest_mm = NEAREST_MM if nearest_mm is None else nearest_mm
+    if least_score is not None:
+        raise UserError(f"{folder}: poses in a folder have no scores; leave `least_score` out")
+    nearest_mm = nearest_or_default(nearest_mm)
     estimates, truths = _files(folder), _files(truth)
     both = [name for name in estimates if name in truths]
     rows, warnings = [], dict[str, None]()
@@ -60,8 +62,7 @@ def read_pose_folders(
             f"within {nearest_mm:g} mm: are both of the same frames, and object to camera?"
         )
     table = pd.DataFrame(rows).dropna(axis=1)
-    shared = models_info, objects, None, least_score
-    pairs = read_orientation_table(folder, None, *shared, rows=table)
+    pairs = read_orientation_table(folder, None, models_info, objects, rows=table)
     counts = (
         (len(both), len(rows), f"estimates are farther than {nearest_mm:g} mm from the truth"),
         (len(estimates), len(both), f"estimates have no truth in {truth}"),
@@ -85,6 +86,8 @@ def _pose(file: Path) -> GivenPose | None:
     (name, given), *others = read_entries(file, "")
     if others:
         raise UserError(f"{file} holds {1 + len(others)} poses; give one for each frame")
+    if isinstance(given, np.ndarray) and given.size == 7:
+        raise UserError(f"{file} has 7 numbers: give a 4 × 4 matrix, or {IN_JSON}")
     if isinstance(given, np.ndarray) and (
         np.isnan(given).any() or not given.any() or np.array_equal(given, np.eye(4).ravel())
     ):
