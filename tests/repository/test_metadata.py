@@ -101,7 +101,7 @@ def test_the_unpacked_sdist_is_the_repository_without_the_kept_estimates(sdist):
     environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(sdist / "src")}
     done = subprocess.run(command, cwd=sdist, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert re.search(r"^fit +50$", done.stdout, re.MULTILINE)
+    assert re.search(r"^evaluate +50$", done.stdout, re.MULTILINE)
 
 
 @pytest.mark.slow

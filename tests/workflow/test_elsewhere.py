@@ -44,7 +44,7 @@ def write_module(folder: Path, source: str) -> None:
     ("targets", "last"),
     [
         ([], "default"),
-        (["results/paper/evaluation/mug/el00/fold3/proposed.csv"], "evaluate_recommended"),
+        (["results/paper/evaluation/mug/el00/fold3/proposed.csv"], "evaluate"),
     ],
 )
 def test_a_run_is_planned_from_elsewhere_with_the_projects_profile(fresh, tmp_path, targets, last):
