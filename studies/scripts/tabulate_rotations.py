@@ -3,15 +3,16 @@
 from nbv.experiment.run.jobs import job
 
 with job(snakemake):
+    from pathlib import Path
+
     import numpy as np
     import pandas as pd
     from studies.curve_tables import rotation_figure
     from studies.rotation_tables import by_symmetry, orientation_table, reliability_table
 
     from nbv.experiment.report.table import write_table
-    from nbv.files import read_csv
+    from nbv.files import read_csv, read_given_json
     from nbv.style import save_figure
-    from nbv.tables.bop import read_models_info
 
     given, params, output = snakemake.input, snakemake.params, snakemake.output
     walks = [read_csv(path) for path in given.walks]
@@ -21,7 +22,9 @@ with job(snakemake):
     names = list(walks["object_id"].unique())
     groups = {name: [name] for name in names}
     if given.models_info:
-        groups = by_symmetry(names, read_models_info(given.models_info))
+        groups = by_symmetry(
+            names, read_given_json(Path(given.models_info), "give BOP's models_info")
+        )
     if len(names) > 1:
         groups["all categories" if "training" in walks else "all objects"] = names
     rng = np.random.default_rng(params.seed)

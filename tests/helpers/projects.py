@@ -107,6 +107,12 @@ def copy_of_project(folder: Path) -> Project:
     return Project(folder)
 
 
+def copy_run(project: Project, folder: Path) -> None:
+    """Copy what a run has made into another copy of the project."""
+    for part in ("results", ".snakemake"):
+        shutil.copytree(project.folder / part, folder / part, symlinks=True)
+
+
 def finished_project(
     factory: pytest.TempPathFactory,
     name: str,

@@ -1,13 +1,12 @@
 """One category of the paper's run and the studies of its methods, for all tests of this folder."""
 
-import shutil
-from pathlib import Path
+from functools import partial
 
 import pytest
 from snakemake.utils import Paramspace
 from studies.ablation import ablation_space
 
-from projects import MUGS, STUDIES, Project, finished_project
+from projects import MUGS, STUDIES, Project, copy_run, finished_project
 
 # A job of every kind.
 PAPER = (
@@ -39,10 +38,12 @@ def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Project:
 def studied(evaluated: Project, tmp_path_factory: pytest.TempPathFactory) -> Project:
     """The evaluated project after the studies of its estimates. Not to be changed."""
 
-    def copy_run(folder: Path) -> None:
-        shutil.copytree(evaluated.folder, folder, symlinks=True, dirs_exist_ok=True)
-
     targets = ("extensions", "transfer", "rotations", ABLATION, CUBE)
     return finished_project(
-        tmp_path_factory, "studied", *STUDIES, *targets, overrides=STUDIED, prepare=copy_run
+        tmp_path_factory,
+        "studied",
+        *STUDIES,
+        *targets,
+        overrides=STUDIED,
+        prepare=partial(copy_run, evaluated),
     )

@@ -1,7 +1,7 @@
 """Another estimator and calibration in the real Snakefile, compared with a finished default run."""
 
 import json
-import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import safetensors
 
-from projects import MUGS, STUDIES, Project, finished_project
+from projects import MUGS, STUDIES, Project, copy_run, finished_project
 
 pytestmark = pytest.mark.slow
 
@@ -32,9 +32,7 @@ def other(evaluated: Project, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "other",
         *(*STUDIES, "runs"),
         overrides=(*OTHER, "compared_runs=[tiny]"),
-        prepare=lambda folder: shutil.copytree(
-            evaluated.folder, folder, symlinks=True, dirs_exist_ok=True
-        ),
+        prepare=partial(copy_run, evaluated),
     )
     return made.folder / "results/other"
 
