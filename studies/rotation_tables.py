@@ -21,10 +21,10 @@ FIGURES = ("error_deg", "above_30", "n_views")
 """Means over the first views of every instance; an object's are the means over its instances."""
 
 LESS = {
-    "less_random": "less random",
-    "less_opposite": "less opposite",
-    "less_chance": "less chance, the instance's mean number",
-    "less_chance_overall": "less chance, the overall mean number",
+    "less_random": "− random",
+    "less_opposite": "− opposite",
+    "less_chance": "− stopped at random, the instance's mean number",
+    "less_chance_overall": "− stopped at random, the overall mean number",
 }
 
 
@@ -86,8 +86,8 @@ def method_errors(walks: pd.DataFrame) -> pd.DataFrame:
     """Return figures of each instance (index) and method; columns are (figure, method).
 
     Methods are ``<order>_<number of views>`` and ``<order>_<rule>``. Figures are `FIGURES`, and the
-    error of the same order of views where the number of views is drawn by chance, with the method's
-    mean number of the instance (``chance``) or of all instances (``chance_overall``).
+    error of the same order of views where the number of views is random, with the method's mean
+    number of the instance (``chance``) or of all instances (``chance_overall``).
     """
     index = ["object_id", *(["training"] if "training" in walks else []), "instance"]
     walks = walks.assign(above_30=walks["error_deg"] > 30)
@@ -185,7 +185,7 @@ def orientation_table(
         (
             "Errors are modulo symmetry. Figures are means over objects of means over instances.",
             f"In brackets 95 % intervals: {n_resamples} resamples of {drawn}, then instances.",
-            "Less chance: less the same order with a number of views that is drawn by chance.",
+            "Stopped at random: the same order and the same mean number of views.",
             DECIDED,
         ),
     )

@@ -167,7 +167,7 @@ def rotations(folder: str) -> pd.DataFrame:
         fixed = [error[group, name] for name in ROTATIONS.values()]
         chance = f"{less[stopped]:.1f}"
         rows[group] = [*fixed, f"{error[stopped]} ({views[stopped]} views)", chance]
-    columns = [*ROTATIONS, "until the decision", "as many by chance"]
+    columns = [*ROTATIONS, "until the decision", "stopped at random"]
     return pd.DataFrame(rows, index=columns).T.rename(index=str.capitalize)
 
 

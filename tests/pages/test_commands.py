@@ -26,7 +26,9 @@ RUN = ("bundles", "camera", "own-category", "your-estimator")
 def commands(path: Path, program: str) -> list[list[str]]:
     """Return the arguments of a program in a page's blocks and code, in their order."""
     text = path.read_text("utf-8").replace("\\\n", "")
-    found = re.findall(rf"^(?:    )?({program} .*)$|`({program} [^`]+)`", text, re.MULTILINE)
+    fence = re.compile(r"^```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+    text = fence.sub(lambda block: re.sub("^", "    ", block[1], flags=re.MULTILINE), text)
+    found = re.findall(rf"^    ({program} .*)$|`({program} [^`]+)`", text, re.MULTILINE)
     lines = [re.split(r"  +#| > | && | \.\.\.", first or other)[0] for first, other in found]
     return [shlex.split(line)[1:] for line in lines]
 

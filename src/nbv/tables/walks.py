@@ -65,7 +65,7 @@ def walks(
     """Yield a row for each first view, order and number of views of an instance.
 
     `known` are pairs of other instances, `images` those of the instance, which stands still. The
-    generator is for orders by chance; `firsts` are the first views, by default all images.
+    generator is for random orders; `firsts` are the first views, by default all images.
     """
     object_id, truth, score = images.object_ids[0], images.truth, images.score
     if score is not None and not np.isfinite(score).all():
@@ -140,8 +140,8 @@ class Forecast:
     mean_views : float
         Number of views at which the decision ends.
     choosing_deg, stopping_deg : tuple of float
-        What a recommended second view saves over a random one, and stopping over the same mean
-        number of views by chance, each with its 95 % interval.
+        What a recommended second view saves over a random one, and stopping over stopping at
+        random after the same mean number of views, each with its 95 % interval.
     bounds_deg : dict of str to dict
         `bounds_of` the errors of one random image an object, after one view and ``stopped``.
     """
@@ -159,7 +159,7 @@ class Forecast:
         parts = []
         for what, other, (mean, low, high) in (
             ("choosing", "a random second view", self.choosing_deg),
-            (stopping, "as many views by chance", self.stopping_deg),
+            (stopping, "stopping at random after as many", self.stopping_deg),
         ):
             saved = f"{number(mean, 1)}° ({number(low, 1)} to {number(high, 1)})"
             if low > 0:
