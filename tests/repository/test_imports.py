@@ -21,13 +21,13 @@ def test_the_import_contracts_are_kept():
 
 def test_the_drawing_shows_every_import_between_rooms():
     *layers, _ground = CONTRACTS["contracts"][0]["layers"]
-    rooms = [room for layer in layers for room in layer.split(" | ")]
+    subpackages = [name for layer in layers for name in layer.split(" | ")]
     graph = grimp.build_graph("nbv", cache_dir=None)
-    for room in rooms:
-        graph.squash_module(f"nbv.{room}")
+    for name in subpackages:
+        graph.squash_module(f"nbv.{name}")
     imports = {
         (upper, lower)
-        for upper, lower in permutations(rooms, 2)
+        for upper, lower in permutations(subpackages, 2)
         if graph.direct_import_exists(importer=f"nbv.{upper}", imported=f"nbv.{lower}")
     }
     text = (ROOT / "docs" / "architecture.md").read_text()

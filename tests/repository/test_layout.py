@@ -1,4 +1,4 @@
-"""Which file tests a module: the one of its name, in the folder of its room."""
+"""Which file tests a module: the one of its name, in the folder of its subpackage."""
 
 from pathlib import Path
 
