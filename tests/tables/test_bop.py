@@ -164,6 +164,13 @@ def test_a_fault_of_the_truth_is_named_in_its_file(scene, tmp_path, key, value, 
     assert len(read(tmp_path, rows[rows["im_id"] != 3], truths).truth) == 78
 
 
+def test_a_scene_has_its_number_with_zeros_before_it_or_without(scene, tmp_path):
+    found = read(tmp_path, *scene)
+    (tmp_path / "000005").rename(tmp_path / "5")
+    again = read_orientation_table(tmp_path / "results.csv")
+    np.testing.assert_array_equal(again.truth, found.truth)
+
+
 def test_truths_of_one_of_several_cameras_are_named(scene, tmp_path):
     rows, truths = scene
     read(tmp_path, rows, truths)

@@ -292,9 +292,10 @@ def _with_instances(truth: Path, known: pd.DataFrame) -> NDArray[np.object_]:
 def _read_scenes(folder: Path, wanted: set[str]) -> tuple[pd.DataFrame, set[str]]:
     """Read the truths of images as texts, in the form of results, and which images there are."""
     truths, images = [], set()
+    files = sorted(folder.glob("*/scene_gt.json"), reverse=True)  # 000001 before 1
+    by_scene = {int(file.parent.name): file for file in files if file.parent.name.isdecimal()}
     for scene in sorted({image.split("/")[0] for image in wanted}):
-        file = folder / f"{int(scene):06d}" / "scene_gt.json"
-        if not file.is_file():
+        if (file := by_scene.get(int(scene))) is None:
             continue
         for image, entries in _read_entries(file).items():
             try:
