@@ -41,7 +41,7 @@ reproduce: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
 
 quick: $(READY)
-	@echo "nbv: now the paper with linear estimators: usually five minutes on two cores"
+	@echo "nbv: now the paper with linear estimators: usually four minutes on two cores"
 	$(BIN)/snakemake --cores $(CORES) --config experiment=quick
 
 confirm: $(READY)

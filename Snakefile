@@ -16,7 +16,7 @@ import sys
 
 from snakemake.utils import min_version
 
-min_version("9.0")
+min_version("9.12")  # has `pathvars`
 
 # It is no path where Snakemake fetches a module file by file.
 if not isinstance(workflow.current_basedir, os.PathLike):

@@ -113,7 +113,10 @@ def written() -> dict[str, str]:
     cited = citation(old, project, date, own["doi"])
     _, head, body = (ROOT / "joss/paper.md").read_text("utf-8").split("---\n", 2)
     front = yaml.safe_load(head) | {
-        "authors": [{"name": one["name"], "affiliation": 1} for one in project["authors"]],
+        "authors": [
+            {"name": one["name"]} | ({"orcid": orcid} if orcid else {}) | {"affiliation": 1}
+            for one, orcid in zip(project["authors"], own["orcids"], strict=True)
+        ],
         "affiliations": [{"index": 1, "name": own["affiliation"]}],
         "tags": project["keywords"],
     }
