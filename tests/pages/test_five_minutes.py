@@ -15,7 +15,8 @@ from nbv.cli import main
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs/five-minutes.md").read_text("utf-8")
-SHOWN = re.findall(r"^    (.+)$", TEXT.split("source nbv-env/bin/activate")[1], re.MULTILINE)
+TERMINAL = TEXT.split("source nbv-env/bin/activate")[1].split("```python")[0]
+SHOWN = re.findall(r"^    (.+)$", TERMINAL, re.MULTILINE)
 COMMANDS = [line for line in SHOWN if line.startswith("nbv ")]
 ANSWERS = [line for line in SHOWN if line not in COMMANDS]
 DECIMAL = r"\d+\.\d+"
