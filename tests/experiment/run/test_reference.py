@@ -1,11 +1,12 @@
 import json
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.errors import UserError
-from nbv.experiment.config import read_configuration
+from nbv.experiment.config import load_config, read_configuration
 from nbv.experiment.report.tables import TABLES
 from nbv.experiment.run.compare import compare_runs
 from nbv.experiment.run.reference import (
@@ -14,6 +15,8 @@ from nbv.experiment.run.reference import (
     differing_settings,
     find_reference,
 )
+
+ROOT = Path(__file__).parents[3]
 
 
 def files(folder):
@@ -85,6 +88,13 @@ def test_other_settings_are_told_before_a_run_is_made(finished, tmp_path):
     assert find_reference(tmp_path, configuration) == reference
     with pytest.raises(UserError, match=r"settings differ from .*: seed=3 \(reference: not set\)$"):
         find_reference(tmp_path, configuration | {"seed": 3})
+
+
+@pytest.mark.parametrize("name", ["paper", "quick"])
+def test_a_run_of_today_can_be_compared_with_what_is_kept(name):
+    configuration = load_config(ROOT / "config", [f"experiment={name}"])
+    kept = ROOT / "docs/reference" / name
+    assert find_reference(kept.parent, configuration) == kept
 
 
 def test_settings_that_no_table_of_every_run_depends_on():
