@@ -356,6 +356,7 @@ def test_the_next_pose_is_read_back_in_every_form(tmp_path, monkeypatch, capsys)
     """The commands of the page for a folder of poses, and the other forms."""
     monkeypatch.chdir(tmp_path)
     page = (Path(__file__).parents[2] / "docs/your-estimator.md").read_text("utf-8")
+    page = re.sub(r"\\\n|  +#.*", "", page)
     made, calibrate, command = re.findall(
         r"^    ((?:python|nbv) .*(?:ob_in|FOLDER).*)$", page, re.M
     )
