@@ -115,15 +115,17 @@ def evaluate(
 
     The table of pairs has `COLUMNS` and those of `nbv.tables.bop.read_orientation_table`. With a
     column ``role`` an instance is for calibration or tested, else both. ``settings`` has
-    ``objects``, which are evaluated, and ``score_objects``, which calibrate too.
+    ``objects``, which are evaluated, ``score_objects``, which calibrate too, and ``draws`` of the
+    random order from each first view; the k-th of n images is k + n, k + 2 n, … in further ones.
     """
     cases = list(held_out(path, models_info, settings))
-    return pd.DataFrame(
-        [
-            {"object_id": case.object_id, "instance": case.name} | row
-            for case in logged(cases, len(cases), "instances")
-            for row in walks.walks(
-                case.known, case.images, rng_for(seed, "rotations", case.name), ORDERS
-            )
-        ]
-    )
+    further = range(1, settings["draws"])
+    orders = ORDERS | {f"random {draw}": ORDERS["random"] for draw in further}
+    rows = []
+    for case in logged(cases, len(cases), "instances"):
+        rng = rng_for(seed, "rotations", case.name)
+        for row in walks.walks(case.known, case.images, rng, orders):
+            row["order"], _, draw = row["order"].partition(" ")
+            row["first"] += int(draw or 0) * len(case.images.truth)
+            rows.append({"object_id": case.object_id, "instance": case.name} | row)
+    return pd.DataFrame(rows)

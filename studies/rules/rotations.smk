@@ -19,7 +19,7 @@ rule evaluate_rotations:
         mem_mb=per_attempt(2000),
         runtime=per_attempt(60),
     params:
-        settings={key: CONFIG["rotations"][key] for key in ("objects", "score_objects")},
+        settings={key: CONFIG["rotations"][key] for key in ("objects", "score_objects", "draws")},
         seed=CONFIG["seed"],
     script:
         "../scripts/evaluate_rotations.py"

@@ -17,7 +17,7 @@ from nbv.tables.next_camera import PoseEstimate
 from rotation_pairs import orientation_pairs
 
 PAIRS = Path(__file__).parents[3] / "shared/data/estimates/tless_megapose.csv"
-ALL = {"objects": [], "score_objects": []}
+ALL = {"objects": [], "score_objects": [], "draws": 1}
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +66,25 @@ def test_views_of_a_walk_are_apart(tmp_path):
     walks = evaluate(tmp_path / "pairs.csv", None, ALL, seed=0)
     numbers = walks.groupby(["instance", "first", "order"])["n_views"].agg(tuple)
     assert numbers.tolist() == [(1, 2)] * 12 * len(ORDERS)
+
+
+def test_the_random_order_is_drawn_as_often_as_asked(pairs, walked):
+    drawn = evaluate(pairs, None, ALL | {"draws": 3}, seed=0)
+    others = drawn["order"] != "random"
+    pd.testing.assert_frame_equal(
+        drawn[others].reset_index(drop=True),
+        walked[walked["order"] != "random"].reset_index(drop=True),
+    )
+    n_firsts = drawn.groupby(["order", "instance"])["first"].nunique()
+    assert (n_firsts["random"] == 3 * n_firsts["recommended"]).all()
+    # Each draw is a walk of its own: from the same first view to others.
+    starts = drawn[drawn["order"] == "random"].query("n_views == 1")
+    assert (starts.groupby(["instance", "error_deg"]).size() >= 3).all()
+    two = drawn[~others].query("n_views == 2")
+    seen = two.groupby(["instance", "first"])["error_deg"].first()
+    assert method_errors(drawn)["error_deg", "random_2"].tolist() == pytest.approx(
+        seen.groupby("instance").mean().tolist()
+    )
 
 
 def test_walks_stop_at_the_first_view_that_is_enough(walked):

@@ -31,7 +31,7 @@ def test_the_forecast_of_all_first_views_is_the_studys(tmp_path, capsys, monkeyp
     command = ["calibrate", str(pairs), "--output", str(pairs.with_suffix(".npz"))]
     assert main([*command, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["forecast"]
-    walks = evaluate(pairs, None, {"objects": [], "score_objects": []}, seed=0)
+    walks = evaluate(pairs, None, {"objects": [], "score_objects": [], "draws": 1}, seed=0)
     figures = method_errors(walks).groupby("object_id").mean().mean()
     methods = {"one view": "recommended_1", "opposite": "opposite_2"}
     methods |= {"recommended": "recommended_2", "stopped": "recommended_decision"}

@@ -26,8 +26,7 @@ from nbv.tables.next_camera import MOST_VIEWS, CameraMove, CameraRecommendation,
 from nbv.tables.orientation_table import OrientationTable
 
 Order = Callable[[Sequence[CameraMove], Array, np.random.Generator], int]
-"""Takes ranked moves, the angle (n,) of each candidate to the nearest view, and a generator for
-chance; returns the index of the next view among the candidates."""
+"""Takes ranked moves and the angle (n,) of each candidate to the nearest view; returns an index."""
 
 ORDERS: dict[str, Order] = {
     "random": lambda moves, apart, rng: int(rng.choice(len(apart))),

@@ -350,6 +350,7 @@ class Rotations(Section):
     objects: Annotated[list[Text], Distinct] = []
     score_objects: Annotated[list[Text], Distinct] = []
     judged_folds: Annotated[list[Whole], Distinct] = []
+    draws: Annotated[Whole, Field(ge=1, le=1000)] = 1
     turns: Annotated[Whole, Field(ge=2, le=10_000)] = 16
     views: Annotated[Whole, Field(ge=1, le=360)] = 24
     poses: Annotated[Whole, Field(ge=24, le=100_000)] = 4608
