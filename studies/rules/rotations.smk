@@ -19,7 +19,10 @@ rule evaluate_rotations:
         mem_mb=per_attempt(2000),
         runtime=per_attempt(60),
     params:
-        settings={key: CONFIG["rotations"][key] for key in ("objects", "score_objects", "draws")},
+        settings={
+            key: CONFIG["rotations"][key]
+            for key in ("objects", "score_objects", "draws")
+        },
         seed=CONFIG["seed"],
     script:
         "../scripts/evaluate_rotations.py"
