@@ -26,7 +26,7 @@ from nbv.tables.next_camera import MOST_VIEWS, CameraMove, CameraRecommendation,
 from nbv.tables.orientation_table import OrientationTable
 
 Order = Callable[[Sequence[CameraMove], Array, np.random.Generator], int]
-"""Takes ranked moves and the angle (n,) of each candidate to the nearest view; returns an index."""
+"""Takes ranked moves, angles (n,) of candidates to the nearest view, and an rng; gives an index."""
 
 ORDERS: dict[str, Order] = {
     "random": lambda moves, apart, rng: int(rng.choice(len(apart))),
@@ -139,7 +139,7 @@ class Forecast:
     mean_views : float
         Number of views at which the decision ends.
     choosing_deg, stopping_deg : tuple of float
-        What a recommended second view saves over a random one, and stopping over stopping at
+        What a recommended second view saves over a random one, and the decision over stopping at
         random after the same mean number of views, each with its 95 % interval.
     bounds_deg : dict of str to dict
         `bounds_of` the errors of one random image an object, after one view and ``stopped``.
